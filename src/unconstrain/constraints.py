@@ -1,0 +1,126 @@
+"""From constraints to the projections that realise them.
+
+A constraint says which directions of action are impossible: the rows of ``A`` satisfy ``A u = 0``. What is
+left of a policy under it is ``u = N π(x)``, with ``N = I - A⁺A`` the projection onto the nullspace of ``A``.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import DataError
+
+RANK_TOLERANCE = 1e-10
+"""A direction counts as constrained if its singular value exceeds this share of the largest one."""
+
+NEGLIGIBLE_ROW = 1e-14
+"""A row this much shorter than the longest is rounding (a Jacobian's cos(π/2), say), no constraint."""
+
+
+def projection(A: ArrayLike) -> NDArray[np.float64]:
+    """Nullspace projection ``N = I - A⁺A`` of one constraint matrix, or of one per sample.
+
+    Rows may be zero (nothing is constrained by them), of any length, or depend on one another; there may be
+    none, or more than there are actions. Only the directions they span matter.
+
+    Parameters
+    ----------
+    A : array (k, d) or (N, k, d)
+        Constraint rows, ``A u = 0``, over d action dimensions.
+
+    Returns
+    -------
+    array (d, d) or (N, d, d)
+        Symmetric and idempotent, with ``A N = 0`` and trace ``d - rank(A)``.
+
+    Raises
+    ------
+    DataError
+        If `A` has another number of axes or holds NaN or infinity.
+
+    Notes
+    -----
+    Equation (2) of the paper. ``A⁺A = V Vᵀ`` over the right singular vectors whose singular value exceeds
+    `RANK_TOLERANCE` times the largest, after each row is scaled to unit length: rows in metres and rows in
+    radians then count alike, and so do strong and weak contacts. Rows shorter than `NEGLIGIBLE_ROW` times the
+    longest are taken as zero.
+    """
+    rows = _checked(A)
+    # Scaling by the largest entry first keeps the length of very small or very large rows finite.
+    largest = np.abs(rows).max(axis=-1, keepdims=True, initial=0.0)
+    matters = largest > NEGLIGIBLE_ROW * largest.max(axis=-2, keepdims=True, initial=0.0)
+    unit = np.divide(rows, largest, out=np.zeros_like(rows), where=matters)
+    length = np.linalg.norm(unit, axis=-1, keepdims=True)
+    np.divide(unit, length, out=unit, where=length > 0)
+
+    identity = unconstrained(rows.shape[-1])
+    if rows.shape[-2] == 0 or rows.shape[-1] == 0:
+        return np.broadcast_to(identity, (*rows.shape[:-2], *identity.shape)).copy()
+    _, values, right = np.linalg.svd(unit, full_matrices=False)
+    spanned = right * (values > RANK_TOLERANCE * values[..., :1])[..., None]
+    return identity - np.swapaxes(spanned, -1, -2) @ spanned
+
+
+def combine(*A: ArrayLike) -> NDArray[np.float64]:
+    """One constraint matrix that asks for all the given ones: their rows stacked.
+
+    Parameters
+    ----------
+    *A : arrays (k_i, d) or (N, k_i, d)
+        At least one; those of a single sample hold for all samples of the others.
+
+    Returns
+    -------
+    array (Σ k_i, d) or (N, Σ k_i, d)
+
+    Raises
+    ------
+    DataError
+        If none is given, the numbers of actions d or of samples N differ, or an entry is not finite.
+    """
+    if not A:
+        raise DataError("There is nothing to combine: give at least one constraint matrix.")
+    parts = [_checked(part) for part in A]
+    widths = sorted({part.shape[-1] for part in parts})
+    if len(widths) > 1:
+        raise DataError(
+            f"Constraint matrices over {_listed(widths)} actions cannot be combined: "
+            "give all of them one column per action dimension."
+        )
+    samples = sorted({len(part) for part in parts if part.ndim == 3})
+    if len(samples) > 1:
+        raise DataError(
+            f"Constraint matrices of {_listed(samples)} samples cannot be combined: give one matrix per "
+            "sample of the same recording, or a single one for all."
+        )
+    if samples:
+        parts = [np.broadcast_to(part, (samples[0], *part.shape[-2:])) for part in parts]
+    return np.concatenate(parts, axis=-2)
+
+
+def unconstrained(d: int, samples: int | None = None) -> NDArray[np.float64]:
+    """The projection that changes nothing: the identity (d, d), or (samples, d, d) of them."""
+    identity = np.eye(d)
+    return identity if samples is None else np.broadcast_to(identity, (samples, d, d)).copy()
+
+
+def _checked(A: ArrayLike) -> NDArray[np.float64]:
+    try:
+        rows = np.asarray(A, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(
+            "A constraint matrix must be an array of numbers of shape (k, d) or (N, k, d); "
+            "pad samples that have fewer constraints with rows of zeros."
+        ) from error
+    if rows.ndim not in (2, 3):
+        raise DataError(
+            f"A constraint matrix must have shape (k, d), or (N, k, d) for one per sample, not {rows.shape}; "
+            "write a single row as [[a1, a2, ...]]."
+        )
+    if not np.isfinite(rows).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(rows))[0])
+        raise DataError(f"The constraint matrix has NaN or infinity at index {where}; remove or repair it.")
+    return rows
+
+
+def _listed(numbers: list[int]) -> str:
+    return " and ".join(map(str, numbers))

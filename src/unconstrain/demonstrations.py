@@ -1,0 +1,364 @@
+"""Demonstrations: what a person did, sample by sample, and from which recording each sample comes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from unconstrain.errors import DataError
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int64]
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Demonstrations:
+    """States and the actions taken in them, grouped into episodes.
+
+    Parameters
+    ----------
+    states : array (N, n)
+    actions : array (N, d)
+        What was done, u = N(x) π(x): the constrained action, as recorded or differentiated.
+    episodes : array (N,), optional
+        One value per sample. With `episode_labels`: integer codes into it. Without: any integers or
+        strings, which are sorted, numbered and kept as labels. Default: a single episode.
+    time : array (N,), optional
+        Seconds. `load` counts them from the first stamp of each episode as it was recorded; a fragment
+        of an episode that was split keeps its place in it.
+    policy : array (N, d), optional
+        The true unconstrained action π(x), known only in simulation.
+    projections : array (N, d, d), optional
+        The true nullspace projections N(x), known only in simulation.
+    state_names, action_names : sequence of str, optional
+        Default x1, x2, ... and u1, u2, ...
+    episode_labels : sequence of str, optional
+        One per episode, each used.
+    notes : sequence of str, optional
+        What whoever uses the data should know of its reading, a sentence each.
+
+    Attributes
+    ----------
+    states, actions, time, policy, projections
+        As above, float64.
+    episodes : array (N,) of int64
+        Codes 0 .. n_episodes - 1, fit to be passed as `groups=`.
+    state_names, action_names, episode_labels, notes : tuple of str
+
+    Raises
+    ------
+    DataError
+        No samples, lengths or dimensions that disagree, NaN or infinity, labels that do not match.
+    """
+
+    states: Array
+    actions: Array
+    episodes: Codes
+    time: Array | None
+    policy: Array | None
+    projections: Array | None
+    state_names: tuple[str, ...]
+    action_names: tuple[str, ...]
+    episode_labels: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def __init__(
+        self,
+        states: ArrayLike,
+        actions: ArrayLike,
+        episodes: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+        policy: ArrayLike | None = None,
+        projections: ArrayLike | None = None,
+        state_names: Sequence[str] | None = None,
+        action_names: Sequence[str] | None = None,
+        episode_labels: Sequence[str] | None = None,
+        notes: Sequence[str] = (),
+    ) -> None:
+        X = _samples("states", states)
+        U = _samples("actions", actions)
+        N, n, d = len(X), X.shape[1], U.shape[1]
+        codes, labels = _episodes(episodes, episode_labels, N)
+        values: dict[str, Any] = {
+            "states": X,
+            "actions": _shaped("actions", U, (N, d)),
+            "episodes": codes,
+            "time": None if time is None else _shaped("time", _numbers("time", time), (N,)),
+            "policy": None if policy is None else _shaped("policy", _numbers("policy", policy), (N, d)),
+            "projections": None
+            if projections is None
+            else _shaped("projections", _numbers("projections", projections), (N, d, d)),
+            "state_names": _names("state_names", state_names, "x", n),
+            "action_names": _names("action_names", action_names, "u", d),
+            "episode_labels": labels,
+            "notes": tuple(notes),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        """The number of samples N."""
+        return len(self.states)
+
+    @property
+    def n_episodes(self) -> int:
+        """How many episodes there are."""
+        return len(self.episode_labels)
+
+    def select(self, samples: ArrayLike | slice) -> "Demonstrations":
+        """The samples of a boolean mask (N,), an array of indices, or a slice.
+
+        Everything is kept consistent: episodes left without samples disappear and the rest are renumbered.
+
+        Raises
+        ------
+        DataError
+            The mask or an index does not fit, or nothing is selected.
+        """
+        index = _index(samples, len(self))
+        used, codes = np.unique(self.episodes[index], return_inverse=True)
+        return self._with(
+            states=self.states[index],
+            actions=self.actions[index],
+            episodes=codes,
+            time=None if self.time is None else self.time[index],
+            policy=None if self.policy is None else self.policy[index],
+            projections=None if self.projections is None else self.projections[index],
+            episode_labels=tuple(self.episode_labels[code] for code in used),
+        )
+
+    def episode(self, which: int | str) -> "Demonstrations":
+        """One episode, by its code or its label.
+
+        Raises
+        ------
+        DataError
+            There is no such episode, or several carry that label.
+        """
+        if isinstance(which, str):
+            codes = [code for code, label in enumerate(self.episode_labels) if label == which]
+            if len(codes) != 1:
+                raise DataError(
+                    f"{len(codes) or 'no'} episodes are labelled {which!r}; "
+                    f"choose one by its number, 0 to {self.n_episodes - 1}"
+                )
+            which = codes[0]
+        if not 0 <= which < self.n_episodes:
+            raise DataError(f"there is no episode {which}; they are numbered 0 to {self.n_episodes - 1}")
+        return self.select(self.episodes == which)
+
+    def blocks(self, k: int) -> Codes:
+        """Labels (N,) that cut every episode into `k` contiguous blocks: `k * episode + block`.
+
+        Neighbouring samples of a recording resemble each other, so folds of single samples flatter a
+        policy. With many episodes, pass `episodes` as `groups=`. With one or a few long recordings, pass
+        these labels instead, and cross-validation runs over blocks within each recording.
+
+        An episode of m samples gives block ⌊k i / m⌋ to its i-th; with m < k some labels stay unused.
+
+        Raises
+        ------
+        DataError
+            `k` is not a positive integer.
+        """
+        if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
+            raise DataError(f"blocks(k) needs a positive integer, got {k!r}")
+        order = np.argsort(self.episodes, kind="stable")
+        sizes = np.bincount(self.episodes, minlength=self.n_episodes)
+        starts = np.cumsum(sizes) - sizes
+        place = np.empty(len(self), dtype=np.int64)  # i, counted within the sample's episode
+        place[order] = np.arange(len(self)) - np.repeat(starts, sizes)
+        return self.episodes * k + k * place // sizes[self.episodes]
+
+    def moving(self, min_speed: float) -> "Demonstrations":
+        """Only the samples with ‖u‖ ≥ `min_speed` (units of the actions), and a note of how many went.
+
+        The policy is read off the direction of the action, û = u / ‖u‖, which is noise when the hand rests.
+
+        Raises
+        ------
+        DataError
+            `min_speed` is not a number ≥ 0, or no sample is that fast.
+        """
+        if not (np.isfinite(min_speed) and min_speed >= 0):
+            raise DataError(f"min_speed must be a number not below zero, got {min_speed!r}")
+        speeds = np.linalg.norm(self.actions, axis=1)
+        keep = speeds >= min_speed
+        slow = int(np.sum(~keep))
+        if slow == len(self):
+            raise DataError(
+                f"no sample is as fast as min_speed={min_speed:g}; "
+                f"the fastest action has speed {speeds.max():.4g}, so choose less"
+            )
+        if not slow:
+            return self
+        note = f"left out {slow} of {len(self)} samples slower than {min_speed:g}"
+        selected = self.select(keep)
+        return selected._with(notes=(*self.notes, note))
+
+    @classmethod
+    def concatenate(cls, several: Sequence["Demonstrations"]) -> "Demonstrations":
+        """One after the other; the episodes stay distinct, and a label already taken gets a number.
+
+        Time, true policy and projections are kept where every one of them has them, otherwise left out
+        with a note. Names are those of the first.
+
+        Raises
+        ------
+        DataError
+            Nothing is given, or their states or actions differ in dimension.
+        """
+        if not several:
+            raise DataError("there are no demonstrations to concatenate")
+        first = several[0]
+        if len(several) == 1:
+            return first
+        for i, other in enumerate(several):
+            for what in ("states", "actions"):
+                have, want = getattr(other, what).shape[1], getattr(first, what).shape[1]
+                if have != want:
+                    raise DataError(
+                        f"the {what} of demonstrations 0 and {i} have {want} and {have} dimensions"
+                    )
+        notes = [note for each in several for note in each.notes]
+
+        def joined(what: str) -> Array | None:
+            parts = [getattr(each, what) for each in several]
+            if all(part is not None for part in parts):
+                return np.concatenate(parts)
+            missing = sum(part is None for part in parts)
+            if missing < len(parts):
+                notes.append(f"left out {what}, which {missing} of {len(parts)} demonstrations do not have")
+            return None
+
+        labels: dict[str, None] = {}  # an ordered set
+        for label in (label for each in several for label in each.episode_labels):
+            distinct, number = label, 1
+            while distinct in labels:
+                number += 1
+                distinct = f"{label} ({number})"
+            labels[distinct] = None
+        offsets = np.cumsum([0] + [each.n_episodes for each in several[:-1]])
+        return cls(
+            states=np.concatenate([each.states for each in several]),
+            actions=np.concatenate([each.actions for each in several]),
+            episodes=np.concatenate([each.episodes + o for each, o in zip(several, offsets, strict=True)]),
+            time=joined("time"),
+            policy=joined("policy"),
+            projections=joined("projections"),
+            state_names=first.state_names,
+            action_names=first.action_names,
+            episode_labels=tuple(labels),
+            notes=tuple(dict.fromkeys(notes)),
+        )
+
+    def _with(self, **changes: Any) -> "Demonstrations":
+        return Demonstrations(**{f.name: getattr(self, f.name) for f in fields(self)} | changes)
+
+    def __repr__(self) -> str:
+        extras = [what for what in ("time", "policy", "projections") if getattr(self, what) is not None]
+        parts = [
+            f"{_count(len(self), 'sample')} in {_count(self.n_episodes, 'episode')}",
+            f"states {_shortened(self.state_names)}",
+            f"actions {_shortened(self.action_names)}",
+            *([f"with {', '.join(extras)}"] if extras else []),
+            *([_count(len(self.notes), "note")] if self.notes else []),
+        ]
+        return f"Demonstrations({'; '.join(parts)})"
+
+
+def _numbers(what: str, values: ArrayLike) -> Array:
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"{what} must be an array of numbers ({error})") from error
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        row, *rest = bad[0].tolist()
+        column = f", column {rest[0]}" if rest else ""
+        raise DataError(
+            f"{what} hold {array[tuple(bad[0])]} at row {row}{column} (counted from 0); "
+            "leave such samples out or fill them in"
+        )
+    return array
+
+
+def _samples(what: str, values: ArrayLike) -> Array:
+    array = _numbers(what, values)
+    if np.ndim(values) != 2:
+        raise DataError(
+            f"{what} must have shape (samples, dimensions), got {np.shape(values)}; "
+            "reshape(-1, 1) makes one dimension of a flat array"
+        )
+    if 0 in array.shape:
+        raise DataError(f"{what} are empty: their shape is {array.shape}")
+    return array
+
+
+def _shaped(what: str, array: Array, shape: tuple[int, ...]) -> Array:
+    if array.shape != shape:
+        raise DataError(
+            f"{what} have shape {array.shape} where {shape} is needed: one row for each of {shape[0]} states"
+            + (f" and {shape[1]} actions" if len(shape) > 1 else "")
+        )
+    return array
+
+
+def _names(what: str, names: Sequence[str] | None, letter: str, count: int) -> tuple[str, ...]:
+    if names is None:
+        return tuple(f"{letter}{i + 1}" for i in range(count))
+    if isinstance(names, str) or len(names) != count:
+        raise DataError(f"{what} must be {count} names, one per dimension, got {names!r}")
+    return tuple(str(name) for name in names)
+
+
+def _episodes(
+    episodes: ArrayLike | None, labels: Sequence[str] | None, count: int
+) -> tuple[Codes, tuple[str, ...]]:
+    values = np.zeros(count, dtype=np.int64) if episodes is None else np.asarray(episodes)
+    if values.shape != (count,):
+        raise DataError(f"episodes have shape {values.shape} where ({count},) is needed: one per state")
+    if values.dtype.kind not in "iuU":
+        raise DataError(f"episodes must be integers or strings, got {values.dtype}")
+    if labels is None:
+        distinct, codes = np.unique(values, return_inverse=True)
+        return codes.astype(np.int64), tuple(str(value) for value in distinct)
+    if values.dtype.kind == "U" or not np.array_equal(np.unique(values), np.arange(len(labels))):
+        raise DataError(
+            f"episodes must be the numbers 0 to {len(labels) - 1}, each used, "
+            f"to go with {len(labels)} episode_labels"
+        )
+    return values.astype(np.int64), tuple(str(label) for label in labels)
+
+
+def _index(samples: ArrayLike | slice, count: int) -> Codes:
+    if isinstance(samples, slice):
+        index = np.arange(count)[samples]
+    else:
+        given = np.asarray(samples)
+        if given.dtype == bool:
+            if given.shape != (count,):
+                raise DataError(f"the mask has shape {given.shape}, but there are {count} samples")
+            index = np.flatnonzero(given)
+        elif given.ndim == 1 and (given.dtype.kind in "iu" or given.size == 0):
+            index = given.astype(np.int64)
+            outside = index[(index < -count) | (index >= count)]
+            if len(outside):
+                raise DataError(f"there is no sample {outside[0]}: they are numbered 0 to {count - 1}")
+        else:
+            raise DataError("select takes a boolean mask, a flat array of indices, or a slice")
+    if not len(index):
+        raise DataError(f"none of the {count} samples is selected")
+    return index
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def _shortened(names: tuple[str, ...]) -> str:
+    if len(names) <= 7:
+        return ", ".join(names)
+    return f"{', '.join(names[:3])}, ..., {names[-1]} ({len(names)})"

@@ -1,0 +1,91 @@
+"""Velocities of a recording that has only positions."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_filter
+
+from unconstrain.errors import DataError
+
+Array = NDArray[np.float64]
+
+# Stamps this close to an even grid, as a share of the step, are taken to be on it: rounding, not jitter.
+EVEN = 1e-9
+
+
+def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, polyorder: int = 2) -> Array:
+    """dx/dt of one episode by Savitzky–Golay: the slope of a polynomial fitted to each moving window.
+
+    At every stamp a polynomial of degree `polyorder` is fitted by least squares to the samples of the
+    window around it, and its slope taken; near the ends, to the first or last window.
+
+    Recorded stamps jitter, while the filter wants an even grid: the states are then carried to a grid of
+    the episode's median step, and the slopes back, by cubic splines. A polynomial of degree ≤ `polyorder`
+    is differentiated exactly (up to rounding) either way.
+
+    Parameters
+    ----------
+    states : array (N, n)
+    time : array (N,)
+        Seconds, strictly increasing.
+    window : float
+        Seconds from a window's first to its last sample, rounded to an odd number of samples and never
+        fewer than the polynomial needs. Longer is smoother and blunter.
+    polyorder : int
+        1, 2 or 3; the splines are cubic, so more would be lost on uneven stamps.
+
+    Returns
+    -------
+    array (N, n)
+        [units of the states] / s.
+
+    Raises
+    ------
+    DataError
+        The window is longer than the episode, or time does not increase strictly.
+    """
+    X, t = np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64)
+    if X.ndim != 2 or t.shape != (len(X),):
+        raise DataError(f"states (N, n) and time (N,) are needed, got shapes {X.shape} and {t.shape}")
+    if polyorder not in (1, 2, 3):
+        raise DataError(f"polyorder must be 1, 2 or 3, got {polyorder!r}")
+    if not (np.isfinite(window) and window > 0):
+        raise DataError(f"window must be a positive number of seconds, got {window!r}")
+    late = np.flatnonzero(~(np.diff(t) > 0))
+    if len(late):
+        raise DataError(f"time does not increase at row {late[0] + 1} (counted from 0)")
+    if not spans_window(t, window, polyorder):
+        raise DataError(
+            f"{len(t)} samples over {t[-1] - t[0] if len(t) else 0:.4g} s are too few for "
+            f"a window of {window:g} s and a polynomial of degree {polyorder}"
+        )
+    t = t - t[0]
+    size, length = _grid_size(t), window_samples(_step(t), window, polyorder)
+    grid = np.linspace(0.0, t[-1], size)
+    step = t[-1] / (size - 1)
+    even = size == len(t) and bool(np.all(np.abs(t - grid) <= EVEN * step))
+    on_grid = X if even else CubicSpline(t, X)(grid)
+    slopes = savgol_filter(on_grid, length, polyorder, deriv=1, delta=step, axis=0, mode="interp")
+    return slopes if even else CubicSpline(grid, slopes)(t)
+
+
+def window_samples(step: float, window: float, polyorder: int = 2) -> int:
+    """The odd number of samples that spans `window` seconds best, at least `polyorder` + 1."""
+    half = max(round(window / (2 * step)), (polyorder + 1) // 2)
+    return 2 * half + 1
+
+
+def spans_window(time: Array, window: float, polyorder: int = 2) -> bool:
+    """Whether an episode with these stamps (seconds, increasing) has a full window of samples."""
+    if len(time) <= polyorder:
+        return False
+    return _grid_size(time) >= window_samples(_step(time), window, polyorder)
+
+
+def _step(time: Array) -> float:
+    # The median, because gaps stretch the mean; but bursts of stamps must not make an endless grid.
+    return max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / (10 * (len(time) - 1)))
+
+
+def _grid_size(time: Array) -> int:
+    return round(float(time[-1] - time[0]) / _step(time)) + 1

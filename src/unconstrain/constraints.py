@@ -7,7 +7,7 @@ left of a policy under it is ``u = N π(x)``, with ``N = I - A⁺A`` the project
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError
+from unconstrain.errors import DataError
 
 RANK_TOLERANCE = 1e-10
 """A direction counts as constrained if its singular value exceeds this share of the largest one."""
@@ -56,8 +56,12 @@ def projection(A: ArrayLike) -> NDArray[np.float64]:
     if rows.shape[-2] == 0 or rows.shape[-1] == 0:
         return np.broadcast_to(identity, (*rows.shape[:-2], *identity.shape)).copy()
     _, values, right = np.linalg.svd(unit, full_matrices=False)
-    spanned = right * (values > RANK_TOLERANCE * values[..., :1])[..., None]
-    return identity - np.swapaxes(spanned, -1, -2) @ spanned
+    constrained = values > RANK_TOLERANCE * values[..., :1]
+    spanned = right * constrained[..., None]
+    N = identity - np.swapaxes(spanned, -1, -2) @ spanned
+    # What blocks all motion leaves exactly none: rounding would pass for a movement with a direction.
+    N[constrained.sum(axis=-1) == rows.shape[-1]] = 0.0
+    return N
 
 
 def combine(*A: ArrayLike) -> NDArray[np.float64]:

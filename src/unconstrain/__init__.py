@@ -1,0 +1,28 @@
+"""Learn the policy behind constrained demonstrations.
+
+>>> import unconstrain as uc
+>>> demos = uc.load("wipe.csv", state=["x", "y", "z"], time="t", episode="run")   # doctest: +SKIP
+>>> policy = uc.LocallyLinearPolicy(alpha="cv")                                     # doctest: +SKIP
+>>> policy.fit(demos.states, demos.actions, groups=demos.episodes)                  # doctest: +SKIP
+"""
+
+from importlib.metadata import version
+
+from unconstrain import constraints, errors, features, risk
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.features import NormalizedRBF
+from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_policy
+
+__version__ = version("unconstrain")
+
+__all__ = [
+    "Demonstrations",
+    "LocallyLinearPolicy",
+    "NormalizedRBF",
+    "ParametricPolicy",
+    "constraints",
+    "errors",
+    "features",
+    "load_policy",
+    "risk",
+]

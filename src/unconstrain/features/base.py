@@ -1,0 +1,30 @@
+"""The protocol: a policy that is linear in its parameters is a feature map seen along a direction.
+
+For any policy `pi(x) = Φ(x) w`, with `Φ` the d x P matrix of features, an observer who looks along a
+direction q sees `qᵀ pi(x) = v(x, q)ᵀ w` with `v = Φᵀ q`. Learning needs nothing but `v`; full, decoupled and
+potential features differ in nothing else.
+"""
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+
+@runtime_checkable
+class PolicyFeatures(Protocol):
+    """Features of a policy that is linear in its P parameters."""
+
+    n_parameters_: int
+    """P, known once fitted."""
+
+    def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "PolicyFeatures":
+        """Fix what depends on data (centres, knots) from states X (N, n), for actions of dimension d."""
+        ...
+
+    def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """`v(x, q)` for states X (N, n) and one direction each (N, d): an array V (N, P) with `V w = qᵀ pi(x)`."""
+        ...
+
+    def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """The policy itself, `pi(x) = Φ(x) w`: actions (N, d) at states X (N, n) for parameters w (P,)."""
+        ...

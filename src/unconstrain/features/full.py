@@ -1,0 +1,58 @@
+"""Full features: every action has its own weights on one shared basis, `pi(x) = W b(x)`.
+
+With the parameters in the order of W's rows, `w = vec(Wᵀ)`, what is seen along q is `v = q ⊗ b(x)`, and a sum of
+`v vᵀ` is a sum of `(q qᵀ) ⊗ (b bᵀ)`: symmetric in both factors. `moments` makes use of that.
+Source: ICRA 2009, Sec. III-A.
+"""
+
+import numpy as np
+from scipy import sparse
+from sklearn.base import clone
+from sklearn.utils.validation import has_fit_parameter
+
+from unconstrain.errors import PolicyError
+
+
+class FullFeatures:
+    """`pi(x) = W b(x)` with W (d, M) free.
+
+    transformer: any scikit-learn transformer whose output is `b(x)`, or None for the linear policy,
+        `b(x) = (x, 1)`. It is cloned, never changed.
+    """
+
+    def __init__(self, transformer=None):
+        if transformer is not None and not (
+            hasattr(transformer, "fit") and hasattr(transformer, "transform")
+        ):
+            raise PolicyError(
+                f"features must be policy features or a scikit-learn transformer, got {transformer!r}"
+            )
+        self.transformer = transformer
+
+    def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "FullFeatures":
+        """Fit the transformer to states X (N, n), with weights (N,) where it takes them."""
+        self.transformer_ = None
+        if self.transformer is not None:
+            weighted = sample_weight is not None and has_fit_parameter(self.transformer, "sample_weight")
+            self.transformer_ = clone(self.transformer).fit(
+                X, **({"sample_weight": sample_weight} if weighted else {})
+            )
+        self.n_actions_ = d
+        self.n_basis_ = self.basis(X[:1]).shape[1]
+        self.n_parameters_ = d * self.n_basis_
+        return self
+
+    def basis(self, X: np.ndarray) -> np.ndarray:
+        """`b(x)` at states X (N, n): an array (N, M)."""
+        if self.transformer_ is None:
+            return np.column_stack([X, np.ones(len(X))])
+        B = self.transformer_.transform(X)
+        return np.asarray(B.toarray() if sparse.issparse(B) else B, dtype=np.float64)
+
+    def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """`v = q ⊗ b(x)`, (N, dM), for states X (N, n) and directions (N, d)."""
+        return (directions[:, :, None] * self.basis(X)[:, None, :]).reshape(len(X), -1)
+
+    def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """`pi(x) = W b(x)`: actions (N, d) at states X (N, n) for parameters w (dM,)."""
+        return self.basis(X) @ w.reshape(self.n_actions_, -1).T

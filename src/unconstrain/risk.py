@@ -1,0 +1,147 @@
+"""What a policy is measured by: four risks that differ only in the projection before the error.
+
+Every risk here is a mean over samples of a squared error behind a projection,
+
+    E = 1/N Σ_n ‖Q_n (u_n - p_n)‖²,        p_n = model(x_n),
+
+where the rows of `Q_n` (k x d) say what of the action is looked at:
+
+| risk          | Q_n            | error of a sample        | needs            |
+| ------------- | -------------- | ------------------------ | ---------------- |
+| direct        | I              | ‖u_n - p_n‖²             | data             |
+| constrained   | N_n            | ‖u_n - N_n p_n‖²         | true projections |
+| inconsistency | û_nᵀ           | (r_n - û_nᵀ p_n)²        | data             |
+
+with `r = ‖u‖` and `û = u / r`. `û ûᵀ` projects onto a line that surely lies in the image of the unknown
+`N`, so the true policy has no inconsistency, whatever the constraints were, and for every model
+
+    inconsistency <= constrained policy error <= unconstrained policy error.
+
+Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) to (7).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from unconstrain.errors import DataError
+from unconstrain.validation import check_actions, check_projections
+
+RISKS = ("inconsistency", "direct", "constrained")
+
+# An action this much shorter than the longest one is rounding left by a projection that blocked all motion:
+# its direction is noise, and would be taught as truth.
+NO_MOTION = 1e-12
+
+
+def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
+    """Which actions (N, d) have a direction, as a mask (N,): those longer than `NO_MOTION` times `scale`.
+
+    `scale` is the longest action's length, in the action's unit, where it is known from elsewhere.
+    """
+    lengths = np.linalg.norm(U, axis=1)
+    return lengths > NO_MOTION * (lengths.max(initial=0.0) if scale is None else scale)
+
+
+def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions `û` (N, d) and lengths `r` (N,) of actions U (N, d); both zero where an action is zero."""
+    lengths = np.where(moving(U), np.linalg.norm(U, axis=1), 0.0)
+    inverse = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0)
+    return U * inverse[:, None], lengths
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a risk sees of N samples: `Q_n` and `Q_n u_n` of `Σ_n ‖Q_n (u_n - p_n)‖²`.
+
+    rows: `Q`, (N, k, d).
+    targets: `Q u`, (N, k).
+    whole: true where every `Q_n` is the identity, so that the action's dimensions part company.
+    """
+
+    rows: np.ndarray
+    targets: np.ndarray
+    whole: bool = False
+
+    def __len__(self) -> int:
+        return len(self.targets)
+
+    def __getitem__(self, index) -> "Sight":
+        return Sight(self.rows[index], self.targets[index], self.whole)
+
+    @property
+    def n_actions(self) -> int:
+        return self.rows.shape[2]
+
+    @property
+    def squares(self) -> np.ndarray:
+        """`‖Q u‖²` of each sample, (N,)."""
+        return np.einsum("nk,nk->n", self.targets, self.targets)
+
+
+def sight(risk: str, U: np.ndarray, projections: np.ndarray | None = None) -> Sight:
+    """What `risk`, one of `RISKS`, sees of actions U (N, d); `projections` (N, d, d) for "constrained"."""
+    if risk == "inconsistency":
+        unit, lengths = directions(U)
+        return Sight(unit[:, None, :], lengths[:, None])
+    if risk == "constrained":
+        # An orthogonal projection is its own Q: NᵀN = N.
+        assert projections is not None
+        return Sight(projections, np.einsum("nij,nj->ni", projections, U))
+    d = U.shape[1]
+    return Sight(np.broadcast_to(np.eye(d), (len(U), d, d)), U, whole=True)
+
+
+def inconsistency(U, P) -> float:
+    """Mean inconsistency `1/N Σ (r_n - û_nᵀ p_n)²` of predictions P (N, d) with actions U (N, d).
+
+    In squared units of the action. Zero actions have no direction: they add nothing to the sum and are
+    counted in N, so that `inconsistency <= constrained_policy_error` holds for every model and data.
+    """
+    U, P = _pair(U, P, "actions", "predictions")
+    unit, lengths = directions(U)
+    return float(np.mean((lengths - np.einsum("nd,nd->n", unit, P)) ** 2))
+
+
+def direct(U, P) -> float:
+    """Mean direct risk `1/N Σ ‖u_n - p_n‖²`, what ordinary regression minimises. U, P (N, d)."""
+    U, P = _pair(U, P, "actions", "predictions")
+    return float(np.mean(np.sum((U - P) ** 2, axis=1)))
+
+
+def constrained_policy_error(Pi, P, N) -> float:
+    """CPE, `1/N Σ ‖N_n (pi_n - p_n)‖²`: the error that shows under the constraints N (N, d, d).
+
+    Pi (N, d) is the true policy or the constrained action `N pi`, which give the same; P (N, d) predictions.
+    """
+    Pi, P = _pair(Pi, P, "the true policy", "predictions")
+    N = check_projections(N, *Pi.shape)
+    return float(np.mean(np.sum(np.einsum("nij,nj->ni", N, Pi - P) ** 2, axis=1)))
+
+
+def unconstrained_policy_error(Pi, P) -> float:
+    """UPE, `1/N Σ ‖pi_n - p_n‖²`, of predictions P (N, d) against the true policy Pi (N, d)."""
+    return direct(Pi, P)
+
+
+def normalized(error: float, Pi) -> float:
+    """`error / Σ_j var(pi_j)`: a mean error as a share of the true policy's variance over the samples Pi (N, d).
+
+    Turns the errors of this module into the paper's nUPE, nCPE and normalised inconsistency. Where the true
+    policy is not known, the actions may stand for it. Raises `DataError` if Pi does not vary.
+    """
+    variance = float(np.sum(np.var(check_actions(Pi, "the true policy"), axis=0)))
+    if variance == 0.0:
+        raise DataError(
+            "the true policy is the same at every sample, so no error can be a share of its variance"
+        )
+    return error / variance
+
+
+def _pair(A, B, name_a: str, name_b: str) -> tuple[np.ndarray, np.ndarray]:
+    A, B = check_actions(A, name_a), check_actions(B, name_b)
+    if A.shape != B.shape:
+        raise DataError(f"{name_a} {A.shape} and {name_b} {B.shape} must have the same shape")
+    if not len(A):
+        raise DataError("no samples: a mean error needs at least one")
+    return A, B

@@ -1,0 +1,102 @@
+"""Choosing the weight decay λ from folds of moments, and judging a policy on episodes it has not seen."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from sklearn.base import clone
+
+from unconstrain import risk
+from unconstrain.errors import DataError
+from unconstrain.moments import Moments
+
+N_ALPHAS = 25
+# λ from one that flattens the policy to one at the resolution of H, relative to H's largest eigenvalue.
+SMALLEST, LARGEST = 1e-12, 1e0
+
+
+class EpisodeFolds:
+    """Deals episodes out to folds: the i-th new episode goes to fold i mod n_folds, and stays there.
+
+    The rule needs no knowledge of what is yet to come, so a stream is dealt out as the whole would be. Samples
+    without episodes are cut into contiguous blocks, since neighbouring samples tell too much about each other.
+    """
+
+    def __init__(self, n_folds: int = 5):
+        self.n_folds = n_folds
+        self.fold_of: dict = {}
+
+    def assign(self, groups: np.ndarray | None, n_samples: int) -> np.ndarray:
+        """The fold of each sample, (N,), for episode labels `groups` (N,), or None."""
+        if groups is None:
+            return np.arange(n_samples) * self.n_folds // n_samples
+        labels, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
+        names = labels.tolist()
+        for position in np.argsort(first):
+            self.fold_of.setdefault(names[position], len(self.fold_of) % self.n_folds)
+        return np.array([self.fold_of[name] for name in names])[inverse]
+
+
+def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
+    """The λ with the least risk on folds left out one at a time.
+
+    Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
+    each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added. `scale` is the
+    largest eigenvalue of all folds' H; the candidates are set relative to it.
+
+    Returns λ, the candidates (L,), and their held-out risk per unit of sample weight (L,).
+    Raises `DataError` where fewer than two folds hold data.
+    """
+    folds = [fold for fold in folds if fold.n_samples]
+    if len(folds) < 2:
+        raise DataError(
+            'alpha="cv" needs at least two episodes, or samples without groups, to hold some out: '
+            "give a number for alpha, or no groups"
+        )
+    alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS) * (scale or 1.0)
+    error = np.zeros(N_ALPHAS)
+    for i, held_out in enumerate(folds):
+        train = Moments.sum(folds[:i] + folds[i + 1 :])
+        candidates = train.decompose().solve(alphas)
+        error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
+    error /= sum(float(fold.weight.sum()) for fold in folds)
+    return float(alphas[np.argmin(error)]), alphas, error
+
+
+def held_out_predictions(policy, X, U, groups=None, n_folds: int = 5, **fit_params) -> np.ndarray:
+    """Predictions (N, d) for every sample by copies of `policy` fitted to the folds it is not in.
+
+    X (N, n), U (N, d), groups (N,); `fit_params` are arrays of N entries handed to `fit`, such as `projections`.
+    Choices made while fitting (λ, centres) are made anew on each training part, so nothing leaks.
+    """
+    U = np.asarray(U, dtype=np.float64)
+    predictions = np.empty_like(U)
+    for train, test in splits(len(U), groups, n_folds):
+        params = {name: value[train] for name, value in fit_params.items()}
+        if groups is not None and len(np.unique(np.asarray(groups)[train])) > 1:
+            params["groups"] = np.asarray(groups)[train]
+        predictions[test] = clone(policy).fit(X[train], U[train], **params).predict(X[test])
+    return predictions
+
+
+def splits(n_samples: int, groups=None, n_folds: int = 5) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Rows to train on and rows to test on, a pair a fold, dealt out as `EpisodeFolds` does."""
+    fold = EpisodeFolds(n_folds).assign(None if groups is None else np.asarray(groups), n_samples)
+    present = np.unique(fold)
+    if len(present) < 2:
+        raise DataError(
+            "cross-validation needs at least two episodes, or samples without groups, to hold some out"
+        )
+    for k in present:
+        yield np.flatnonzero(fold != k), np.flatnonzero(fold == k)
+
+
+def explained(U, P) -> float:
+    """Share of observed motion explained, `1 - Σ (r - û·p)² / Σ r²`, of actions U (N, d) by predictions P (N, d).
+
+    1 for a policy consistent with every sample, 0 for one that says "do not move", negative for worse than that.
+    Raises `DataError` where nothing moves.
+    """
+    motion = float(np.mean(np.sum(np.square(U), axis=-1)))
+    if motion == 0.0:
+        raise DataError("all actions are zero: there is no motion to explain")
+    return 1.0 - risk.inconsistency(U, P) / motion

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .constraints import projection
-from .errors import DataError, PolicyError, UnconstrainError
+from unconstrain.constraints import projection
+from unconstrain.errors import DataError, PolicyError, UnconstrainError
 
 Array = NDArray[np.float64]
 Constraint = ArrayLike | Callable[[Array], ArrayLike]

@@ -1,0 +1,127 @@
+"""The paper's limit cycle under random constraints (section 4.1): the smallest plant that shows the problem."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from unconstrain.constraints import projection, unconstrained
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError, UnconstrainError
+
+SEGMENTS = 3
+"""Constraints per trajectory: the first, and two redraws at regular intervals."""
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """An attracting circle: in polar coordinates ``ṙ = r (ρ - r²)``, ``θ̇ = ω``.
+
+    States and actions are Cartesian, ``x1 = r sin θ``, ``x2 = r cos θ``, so that
+
+        π(x) = (ρ - r²) x + ω (x2, -x1),    r² = x1² + x2²,
+
+    which is also right at the origin. The circle has radius √ρ and is travelled clockwise.
+
+    Attributes
+    ----------
+    rho : float
+        ρ, squared radius of the cycle.
+    omega : float
+        ω in rad/s.
+    """
+
+    rho: float = 0.5
+    omega: float = 1.0
+
+    def __call__(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Actions (N, 2) at states (N, 2)."""
+        X = np.asarray(X, dtype=np.float64)
+        if X.ndim != 2 or X.shape[1] != 2:
+            raise DataError(
+                f"The limit cycle moves in the plane: give states of shape (N, 2), not {X.shape}."
+            )
+        turn = np.stack([X[:, 1], -X[:, 0]], axis=1)
+        return (self.rho - np.sum(X**2, axis=1, keepdims=True)) * X + self.omega * turn
+
+
+def demonstrate(
+    n_episodes: int = 40,
+    length: int = 40,
+    rate: float = 50.0,
+    noise: float = 0.0,
+    *,
+    policy: LimitCycle | None = None,
+    constrained: bool = True,
+    random_state: int | np.random.Generator | None = None,
+) -> Demonstrations:
+    """Movements of the limit cycle, each under three random constraints, one after the other.
+
+    Starts are uniform in [-1, 1]². The constraint ``A = (α1, α2)``, ``α ~ N(0, 1)``, is drawn anew in each
+    third of a trajectory; the action is ``u = N π(x)`` and ``x ← x + u / rate``.
+
+    Parameters
+    ----------
+    n_episodes, length : int
+        Number of trajectories and of samples in each.
+    rate : float
+        Samples per second.
+    noise : float
+        Standard deviation of the Gaussian noise on the recorded actions, as a share of the standard
+        deviation of the clean actions of this data set in the same dimension. It is noise of observation:
+        the movement itself, and so the states, are clean.
+    policy : LimitCycle, optional
+        By default that of the paper, ρ = 0.5, ω = 1.
+    constrained : bool
+        If false, nothing stands in the way and ``u = π(x)``.
+    random_state : int, Generator or None
+        The same number gives the same data.
+
+    Returns
+    -------
+    Demonstrations
+        ``n_episodes * length`` samples with the true policy and projections.
+
+    Raises
+    ------
+    UnconstrainError
+        If a number is not positive, or the noise negative.
+    """
+    if n_episodes < 1 or length < 1 or not (np.isfinite(rate) and rate > 0):
+        raise UnconstrainError(
+            f"Demonstrations need at least one episode and sample and a positive rate, not {n_episodes}, "
+            f"{length} and {rate}."
+        )
+    if not (np.isfinite(noise) and noise >= 0):
+        raise UnconstrainError(f"The noise is a share of the actions' scale, 0 or more, not {noise}.")
+    rng = np.random.default_rng(random_state)
+    policy = policy or LimitCycle()
+
+    x = rng.uniform(-1.0, 1.0, (n_episodes, 2))
+    A = rng.standard_normal((n_episodes, SEGMENTS, 1, 2))
+    N = projection(A.reshape(-1, 1, 2)).reshape(n_episodes, SEGMENTS, 2, 2)
+    if not constrained:
+        N = np.broadcast_to(unconstrained(2), N.shape)
+
+    segment = np.arange(length) * SEGMENTS // length
+    states, wanted = np.empty((2, n_episodes, length, 2))
+    actions = np.empty((n_episodes, length, 2))
+    for k in range(length):
+        states[:, k] = x
+        wanted[:, k] = policy(x)
+        actions[:, k] = np.einsum("eij,ej->ei", N[:, segment[k]], wanted[:, k])
+        x = x + actions[:, k] / rate
+
+    recorded = actions.reshape(-1, 2)
+    if noise:
+        recorded = recorded + noise * recorded.std(axis=0) * rng.standard_normal(recorded.shape)
+    return Demonstrations(
+        states=states.reshape(-1, 2),
+        actions=recorded,
+        episodes=np.repeat(np.arange(n_episodes), length),
+        time=np.tile(np.arange(length) / rate, n_episodes),
+        policy=wanted.reshape(-1, 2),
+        projections=N[:, segment].reshape(-1, 2, 2),
+        state_names=("x1", "x2"),
+        action_names=("u1", "u2"),
+    )

@@ -1,7 +1,7 @@
 """Demonstrations: what a person did, sample by sample, and from which recording each sample comes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -119,7 +119,8 @@ class Demonstrations:
         """
         index = _index(samples, len(self))
         used, codes = np.unique(self.episodes[index], return_inverse=True)
-        return self._with(
+        return replace(
+            self,
             states=self.states[index],
             actions=self.actions[index],
             episodes=codes,
@@ -196,7 +197,7 @@ class Demonstrations:
             return self
         note = f"left out {slow} of {len(self)} samples slower than {min_speed:g}"
         selected = self.select(keep)
-        return selected._with(notes=(*self.notes, note))
+        return replace(selected, notes=(*self.notes, note))
 
     @classmethod
     def concatenate(cls, several: Sequence["Demonstrations"]) -> "Demonstrations":
@@ -253,9 +254,6 @@ class Demonstrations:
             episode_labels=tuple(labels),
             notes=tuple(dict.fromkeys(notes)),
         )
-
-    def _with(self, **changes: Any) -> "Demonstrations":
-        return Demonstrations(**{f.name: getattr(self, f.name) for f in fields(self)} | changes)
 
     def __repr__(self) -> str:
         extras = [what for what in ("time", "policy", "projections") if getattr(self, what) is not None]

@@ -64,6 +64,7 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
     grid = np.linspace(0.0, t[-1], size)
     step = t[-1] / (size - 1)
     even = size == len(t) and bool(np.all(np.abs(t - grid) <= EVEN * step))
+    X = X - X[0]  # so that what rests has a slope of exactly zero
     on_grid = X if even else CubicSpline(t, X)(grid)
     slopes = savgol_filter(on_grid, length, polyorder, deriv=1, delta=step, axis=0, mode="interp")
     return slopes if even else CubicSpline(grid, slopes)(t)

@@ -1,5 +1,6 @@
 """`load` on recordings that cannot be used: one sentence each, naming the file and the place in it."""
 
+import contextlib
 import io
 import json
 import pickle
@@ -43,6 +44,8 @@ MOVING = "t,x\n" + "".join(f"{i / 50},{i}\n" for i in range(20))
         ("x,u\n1,2\n3,\n5,\n", XU, r"column 'u' is empty at line 3 and 1 more"),
         ("x\tu\n1\t2\n\t\n", XU, r"column 'x' is empty at line 3"),
         ("x,u\n1,2\nnan,3\n", XU, r"column 'x' holds nan at line 3"),
+        ("x,u\n1,2\n3,1e300\n", XU, r"column 'u' holds 1e\+300 at line 3"),
+        ("x,u\n" + "1" * 200_000 + ",2\n", XU, r"a.csv cannot be read as a text table"),
         ("x,u\n1,-inf\n2,3\n", XU, r"column 'u' holds -inf at line 2"),
         ("x,u\n1,2\n3,4,5\n", XU, r"a.csv: line 3 has 3 cells where the first line has 2"),
         ("x,u\n1,2\n3\n", XU, r"a.csv: line 3 has 1 cell where the first line has 2"),
@@ -184,3 +187,15 @@ def test_saved_files_that_are_damaged_or_too_new(tmp_path):
         np.savez(path, **good | changes)
         with pytest.raises(DataError, match=sentence):
             load(path)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".parquet"])
+def test_a_changed_byte_of_a_saved_file_is_noticed(tmp_path, suffix):
+    states = np.random.default_rng(0).normal(size=(200, 3))
+    path = tmp_path / f"a{suffix}"
+    save(Demonstrations(states, states), path)
+    good = path.read_bytes()
+    for place in range(50, len(good), 499):
+        path.write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])
+        with contextlib.suppress(DataError):  # otherwise it was a byte of no consequence
+            np.testing.assert_array_equal(load(path).states, states)

@@ -37,11 +37,11 @@ def read(path: Path, shown: str) -> Table:
     if not lines:
         raise DataError(f"{shown} is empty: there is nothing to read")
     probe = [line.decode() for line in lines[:PROBED]]
-    delimiter = _delimiter(probe)
-    if delimiter == " ":
-        lines = [b" ".join(line.split()) for line in lines]
-        probe = [" ".join(line.split()) for line in probe]
     try:
+        delimiter = _delimiter(probe)
+        if delimiter == " ":
+            lines = [b" ".join(line.split()) for line in lines]
+            probe = [" ".join(line.split()) for line in probe]
         cells = list(csv.reader(probe, delimiter=delimiter))
     except csv.Error as error:
         raise DataError(f"{shown} cannot be read as a text table ({error})") from error

@@ -20,9 +20,11 @@ def whole(path: Path, shown: str) -> pa.Table:
         The file is damaged or not Parquet.
     """
     try:
-        with pq.ParquetFile(path) as file:
-            return file.read()
-    except (pa.ArrowException, OSError) as error:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            table = file.read()
+        table.schema.names  # noqa: B018 - damaged names are found only when they are looked at
+        return table
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         if isinstance(error, PermissionError):
             raise
         raise DataError(f"{shown} is damaged or not a Parquet file; write it again") from error

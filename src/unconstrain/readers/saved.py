@@ -43,7 +43,7 @@ def save(demos: Demonstrations, path: str | os.PathLike[str]) -> None:
             with temporary.open("wb") as file:
                 np.savez(file, **found | {KEY: np.array(json.dumps(about))})
         else:
-            pq.write_table(_table(demos, about), temporary)
+            pq.write_table(_table(demos, about), temporary, write_page_checksum=True)
 
 
 def read_saved(path: Path, shown: str) -> Demonstrations | None:

@@ -12,6 +12,7 @@ from unconstrain import constraints, errors, features, risk
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import NormalizedRBF
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_policy
+from unconstrain.readers import load, save
 
 __version__ = version("unconstrain")
 
@@ -23,6 +24,8 @@ __all__ = [
     "constraints",
     "errors",
     "features",
+    "load",
     "load_policy",
     "risk",
+    "save",
 ]

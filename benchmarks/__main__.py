@@ -1,0 +1,62 @@
+"""Run the benchmarks, print one table, write one JSON.
+
+    python -m benchmarks                      all
+    python -m benchmarks local-fit growth     some
+    python -m benchmarks --out FILE           where the JSON goes (default out/benchmarks.json)
+"""
+
+import argparse
+import json
+import platform
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import scipy
+import sklearn
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+import unconstrain as uc
+from benchmarks import fits
+from benchmarks.ratio import Ratio
+
+BENCHMARKS: dict[str, Callable[[], Ratio]] = {
+    "local-fit": fits.local_fit,
+    "parametric-fit": fits.parametric_fit,
+    "wide-fit": fits.wide_fit,
+    "lambda-path": fits.lambda_path,
+    "lambda-path-local": fits.lambda_path_local,
+    "loop": fits.loop,
+    "growth": fits.growth,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
+    parser.add_argument("--out", type=Path, default=Path("out/benchmarks.json"))
+    given = parser.parse_args()
+    unknown = set(given.names) - set(BENCHMARKS)
+    if unknown:
+        parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(BENCHMARKS)}")
+    ratios = [BENCHMARKS[name]() for name in track(given.names or list(BENCHMARKS), "benchmarks", transient=True)]
+    given.out.parent.mkdir(parents=True, exist_ok=True)
+    versions = {"unconstrain": uc.__version__, "numpy": np.__version__, "scipy": scipy.__version__}
+    versions |= {"scikit-learn": sklearn.__version__, "python": platform.python_version()}
+    given.out.write_text(json.dumps({"versions": versions, "ratios": [asdict(r) for r in ratios]}, indent=1) + "\n")
+
+    table = Table("name", "work", "measured against", "ratio", "reach", "", title="unconstrain, speed as ratios")
+    for r in ratios:
+        sign = ">=" if r.more_is_better else "<="
+        verdict = "reached" if r.reached else "missed"
+        table.add_row(r.name, r.work, r.against, f"{r.value:.3g}", f"{sign} {r.reach:g}", verdict)
+    console = Console()
+    console.print(table)
+    console.print(f"written to {given.out}")
+
+
+if __name__ == "__main__":
+    main()

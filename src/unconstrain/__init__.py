@@ -10,17 +10,19 @@ from importlib.metadata import version
 
 from unconstrain import constraints, errors, features, risk
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.features import NormalizedRBF
+from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_policy
 from unconstrain.readers import load, save
 
 __version__ = version("unconstrain")
 
 __all__ = [
+    "DecoupledFeatures",
     "Demonstrations",
     "LocallyLinearPolicy",
     "NormalizedRBF",
     "ParametricPolicy",
+    "PotentialFeatures",
     "constraints",
     "errors",
     "features",

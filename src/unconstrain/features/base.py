@@ -9,6 +9,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from unconstrain.errors import PolicyError
+
 
 @runtime_checkable
 class PolicyFeatures(Protocol):
@@ -28,3 +30,18 @@ class PolicyFeatures(Protocol):
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """The policy itself, `pi(x) = Φ(x) w`: actions (N, d) at states X (N, n) for parameters w (P,)."""
         ...
+
+
+def is_policy_features(candidate) -> bool:
+    """Whether `candidate`, fitted or not, speaks the protocol; the number of parameters is known only once fitted."""
+    named = all(callable(getattr(candidate, name, None)) for name in ("fit", "along", "evaluate"))
+    return named and not isinstance(candidate, type)
+
+
+def check_square(name: str, X: np.ndarray, d: int) -> None:
+    """Raise a `PolicyError` where states X (N, n) and actions of dimension d do not pair up."""
+    if X.shape[1] != d:
+        raise PolicyError(
+            f"{name} needs as many actions as states, in the same order, got {X.shape[1]} states and {d} actions: "
+            "give the columns that belong together, or choose other features"
+        )

@@ -7,13 +7,13 @@ Source: ICRA 2009, Sec. III-A.
 
 import numpy as np
 from scipy import sparse
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils.validation import has_fit_parameter
 
 from unconstrain.errors import PolicyError
 
 
-class FullFeatures:
+class FullFeatures(BaseEstimator):
     """`pi(x) = W b(x)` with W (d, M) free.
 
     transformer: any scikit-learn transformer whose output is `b(x)`, or None for the linear policy,
@@ -47,7 +47,7 @@ class FullFeatures:
         if self.transformer_ is None:
             return np.column_stack([X, np.ones(len(X))])
         B = self.transformer_.transform(X)
-        return np.asarray(B.toarray() if sparse.issparse(B) else B, dtype=np.float64)
+        return np.asarray(sparse.csr_array(B).toarray() if sparse.issparse(B) else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """`v = q ⊗ b(x)`, (N, dM), for states X (N, n) and directions (N, d)."""

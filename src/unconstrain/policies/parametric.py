@@ -1,9 +1,11 @@
 """`pi(x) = Φ(x) w`: one set of parameters for all states. Source: ICRA 2009, Sec. III-A."""
 
 import numpy as np
+from sklearn.base import clone
 
 from unconstrain.accumulation import parametric_moments
-from unconstrain.features import FullFeatures, PolicyFeatures
+from unconstrain.features import FullFeatures
+from unconstrain.features.base import is_policy_features
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
 from unconstrain.risk import Sight
@@ -38,7 +40,7 @@ class ParametricPolicy(Policy):
         self.alpha = alpha
 
     def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:
-        features = self.features if isinstance(self.features, PolicyFeatures) else FullFeatures(self.features)
+        features = clone(self.features) if is_policy_features(self.features) else FullFeatures(self.features)
         self.features_ = features.fit(X, d, weights)
 
     def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:

@@ -6,7 +6,6 @@ Source: ICRA 2009, Sec. III-A.
 """
 
 import numpy as np
-from scipy import sparse
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils.validation import has_fit_parameter
 
@@ -47,7 +46,7 @@ class FullFeatures(BaseEstimator):
         if self.transformer_ is None:
             return np.column_stack([X, np.ones(len(X))])
         B = self.transformer_.transform(X)
-        return np.asarray(sparse.csr_array(B).toarray() if sparse.issparse(B) else B, dtype=np.float64)
+        return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """`v = q ⊗ b(x)`, (N, dM), for states X (N, n) and directions (N, d)."""

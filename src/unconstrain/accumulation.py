@@ -8,19 +8,22 @@ are one matrix product as well. Any other features are summed as `VᵀV`.
 Samples are taken in blocks that stay in the processor's cache; no N x P matrix is ever held.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.linalg.blas import dsyrk
 
 from unconstrain.features import FullFeatures, PolicyFeatures
 from unconstrain.features.centers import activations
 from unconstrain.moments import Moments
+from unconstrain.parallel import blocks, shared_out
 from unconstrain.risk import Sight
 
-BLOCK_NUMBERS = (
-    2**18
-)  # of 8 bytes: what the widest array of a block may hold, about a core's second-level cache
+# Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
+# in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.
+PRODUCTS_IN_BLOCK = 2**19
+ROWS_IN_BLOCK = 2**21
+
+Totals = list[np.ndarray]
 
 
 def parametric_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
@@ -28,7 +31,10 @@ def parametric_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, wei
     if isinstance(features, FullFeatures):
         if seen.whole:
             return _whole_moments(features, X, seen, weights)
-        return _full_moments(features, X, seen, weights)
+        M, d, k = features.n_basis_, seen.n_actions, seen.targets.shape[1]
+        # Products halve the arithmetic; they pay as long as making them is no more work than making V.
+        if k > 1 or _pairs(M) + _pairs(d) <= 2 * features.n_parameters_:
+            return _product_moments(features, X, seen, weights)
     return _row_moments(features, X, seen, weights)
 
 
@@ -39,31 +45,40 @@ def local_moments(
 
     Parameters are in the order of B_m's rows. centers (M, n), width σ, states X (N, n), weights (N,).
     """
-    M, n = centers.shape
-    d = seen.n_actions
+    M, n, d = len(centers), X.shape[1], seen.n_actions
     pairs_b, pairs_q = _pairs(n + 1), (1 if seen.whole else _pairs(d))
-    products = np.zeros((M, pairs_b * pairs_q))
-    g = np.zeros((M, d * (n + 1)))
-    squares, weight = np.zeros(M), np.zeros(M)
-    for block in _blocks(len(X), pairs_b * pairs_q):
-        B = _with_one(X[block])
+    n_products, n_pulls = pairs_b * pairs_q, d * (n + 1)
+
+    def add(block: slice, totals: Totals) -> None:
+        B, part = _with_one(X[block]), seen[block]
         receptive = activations(X[block], centers, width)
         receptive *= weights[block, None]
-        part = seen[block]
-        columns = distinct_products(B)
-        if not seen.whole:
-            columns = (columns[:, None, :] * _seen_products(part)[None, :, :]).reshape(-1, len(B))
-        products += receptive.T @ columns.T
-        pulls = (_pull(part).T[:, None, :] * B.T[None, :, :]).reshape(-1, len(B))
-        g += receptive.T @ pulls.T
-        squares += part.squares @ receptive
-        weight += receptive.sum(axis=0)
+        # All that is summed, a row each: the distinct entries of H, then g, s and the weight itself.
+        total, space = totals
+        summed = space[:, : len(B)]
+        products = summed[:n_products].reshape(pairs_b, pairs_q, -1)
+        if seen.whole:
+            products[:, 0] = distinct_products(B)
+        else:
+            np.multiply(distinct_products(B)[:, None], _seen_products(part), out=products)
+        pulls = summed[n_products:-2].reshape(d, n + 1, -1)
+        np.multiply(_pull(part).T[:, None], B.T, out=pulls)
+        summed[-2] = part.squares
+        summed[-1] = 1.0
+        total += receptive.T @ summed.T
+
+    n_summed = n_products + n_pulls + 2
+    rows = _rows(PRODUCTS_IN_BLOCK, n_summed)
+    # The second is no total but each thread's working space: memory new for every block would cost a fifth more.
+    total, _ = _sum_over_blocks(len(X), rows, [(M, n_summed), (n_summed, rows)], add)
+    H, g = total[:, :n_products], total[:, n_products:-2]
+    squares, weight = total[:, -2].copy(), total[:, -1].copy()
     if seen.whole:
         return Moments(
-            products[:, _pair_index(n + 1)], g.reshape(M, d, n + 1).swapaxes(1, 2), squares, weight, len(X)
+            H[:, _pair_index(n + 1)], g.reshape(M, d, n + 1).swapaxes(1, 2), squares, weight, len(X)
         )
-    H = _unfold(products.reshape(M, pairs_b, pairs_q), n + 1, d)
-    return Moments(H, g[:, :, None], squares, weight, len(X))
+    H = _unfold(H.reshape(M, pairs_b, pairs_q), n + 1, d)
+    return Moments(H, g[:, :, None].copy(), squares, weight, len(X))
 
 
 def distinct_products(A: np.ndarray) -> np.ndarray:
@@ -78,49 +93,70 @@ def distinct_products(A: np.ndarray) -> np.ndarray:
     return products
 
 
-def _full_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+def _product_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
     M, d = features.n_basis_, seen.n_actions
-    g = np.zeros((d, M))
-    squares = weight = 0.0
-    products = np.zeros((_pairs(M), _pairs(d)))
-    for block in _blocks(len(X), _pairs(M) + _pairs(d)):
+
+    def add(block: slice, totals: Totals) -> None:
         B, part, omega = features.basis(X[block]), seen[block], weights[block]
-        products += distinct_products(B) @ (_seen_products(part) * omega).T
-        g += (_pull(part) * omega[:, None]).T @ B
-        squares += part.squares @ omega
-        weight += omega.sum()
-    H = _unfold(products, M, d)
-    return Moments(H, g.reshape(-1, 1), np.asarray(squares), np.asarray(weight), len(X))
+        totals[0] += distinct_products(B) @ (_seen_products(part) * omega).T
+        totals[1] += (_pull(part) * omega[:, None]).T @ B
+        totals[2] += part.squares @ omega
+
+    shapes = [(_pairs(M), _pairs(d)), (d, M), ()]
+    products, g, squares = _sum_over_blocks(
+        len(X), _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d)), shapes, add
+    )
+    return Moments(_unfold(products, M, d), g.reshape(-1, 1), squares, np.sum(weights), len(X))
 
 
 def _whole_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
     """Nothing is projected: `H = (Σ ω b bᵀ) ⊗ I`, so the d dimensions of the action share the M x M block."""
-    total = Moments.zeros((), features.n_basis_, seen.n_actions)
-    for block in _blocks(len(X), features.n_basis_):
-        B, part, omega = features.basis(X[block]), seen[block], weights[block]
-        weighted = (B * omega[:, None]).T
-        total.H += weighted @ B
-        total.g += weighted @ part.targets
-        total.squares += part.squares @ omega
-        total.weight += omega.sum()
-    total.n_samples = len(X)
-    return total
+    M, d = features.n_basis_, seen.n_actions
+
+    def add(block: slice, totals: Totals) -> None:
+        root = np.sqrt(weights[block, None])
+        B, targets = features.basis(X[block]) * root, seen.targets[block] * root
+        totals[0] += B.T @ B
+        totals[1] += B.T @ targets
+        totals[2] += np.einsum("nd,nd->", targets, targets)
+
+    H, g, squares = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, M), [(M, M), (M, d), ()], add)
+    return Moments(H, g, squares, np.sum(weights), len(X))
 
 
 def _row_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
-    total = Moments.zeros((), features.n_parameters_, 1)
-    H = np.zeros_like(total.H, order="F")
-    for block in _blocks(len(X), features.n_parameters_):
-        part, root = seen[block], np.sqrt(weights[block])
+    P = features.n_parameters_
+
+    def add(block: slice, totals: Totals) -> None:
+        part, root = seen[block], np.sqrt(weights[block, None])
         for k in range(part.targets.shape[1]):
-            V = features.along(X[block], part.rows[:, k]) * root[:, None]
-            H = dsyrk(1.0, V.T, beta=1.0, c=H, overwrite_c=True)
-            total.g[:, 0] += V.T @ (part.targets[:, k] * root)
-        total.squares += part.squares @ weights[block]
-        total.weight += weights[block].sum()
-    total.H = np.triu(H) + np.triu(H, 1).T
-    total.n_samples = len(X)
-    return total
+            V = features.along(X[block], part.rows[:, k] * root)
+            totals[0] += V.T @ V
+            totals[1] += V.T @ (part.targets[:, k, None] * root)
+        totals[2] += part.squares @ weights[block]
+
+    H, g, squares = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, P), [(P, P), (P, 1), ()], add)
+    return Moments(H, g, squares, np.sum(weights), len(X))
+
+
+def _sum_over_blocks(
+    n_samples: int, rows: int, shapes: list[tuple[int, ...]], add: Callable[[slice, Totals], None]
+) -> Totals:
+    """What `add` sums into zeroed arrays of `shapes`, over all samples, in blocks of `rows`."""
+
+    def share(of_blocks: Sequence[slice]) -> Totals:
+        totals = [np.zeros(shape) for shape in shapes]
+        for block in of_blocks:
+            add(block, totals)
+        return totals
+
+    first, *others = shared_out(share, blocks(n_samples, rows))
+    return [np.asarray(sum(parts[1:], start=parts[0])) for parts in zip(first, *others, strict=True)]
+
+
+def _rows(numbers: int, width: int) -> int:
+    """How many samples a block of so many numbers holds: few enough for the cache, enough to be worth a call."""
+    return max(256, min(numbers // width, 8192))
 
 
 def _seen_products(seen: Sight) -> np.ndarray:
@@ -157,9 +193,3 @@ def _pair_index(k: int) -> np.ndarray:
 
 def _with_one(X: np.ndarray) -> np.ndarray:
     return np.column_stack([X, np.ones(len(X))])
-
-
-def _blocks(n_samples: int, width: int) -> Iterator[slice]:
-    rows = max(64, BLOCK_NUMBERS // max(width, 1))
-    for start in range(0, n_samples, rows):
-        yield slice(start, min(start + rows, n_samples))

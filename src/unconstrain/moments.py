@@ -9,10 +9,12 @@ and the weight decay λ gives `w = (H + λI)⁻¹ g` (ICRA 2009, eq. 8). Moments
 files and machines. Everything that is chosen or reported about a fit is computed from them.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from unconstrain.parallel import blocks, shared_out
 
 
 @dataclass
@@ -73,7 +75,18 @@ class Moments:
 
     def decompose(self) -> "Spectrum":
         """The eigendecomposition of H, which solves for every λ at once."""
-        values, vectors = np.linalg.eigh(self.H)
+        if self.H.ndim == 2:
+            values, vectors = np.linalg.eigh(self.H)
+        else:
+            stack = self.H.reshape(-1, *self.H.shape[-2:])
+            values, vectors = np.empty(stack.shape[:2]), np.empty(stack.shape)
+
+            def decompose(models: Sequence[slice]) -> None:
+                for m in models:
+                    values[m], vectors[m] = np.linalg.eigh(stack[m])
+
+            shared_out(decompose, blocks(len(stack), 8))
+            values, vectors = values.reshape(self.H.shape[:-1]), vectors.reshape(self.H.shape)
         return Spectrum(values, vectors, vectors.swapaxes(-1, -2) @ self.g)
 
 

@@ -9,6 +9,7 @@
 from importlib.metadata import version
 
 from unconstrain import constraints, errors, features, risk
+from unconstrain.comparison import select_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_policy
@@ -30,4 +31,5 @@ __all__ = [
     "load_policy",
     "risk",
     "save",
+    "select_policy",
 ]

@@ -1,6 +1,7 @@
 """What the policies share: scikit-learn's contract, moments by fold, λ, and what a fit reports."""
 
 from abc import ABC, abstractmethod
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,22 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         """Write the policy to `path` (customarily `.skops`), to be read by `load_policy`. Holds no pickle."""
         check_is_fitted(self)
         persistence.save(self, path)
+
+    def solved(self, *, without: int | None = None):
+        """A copy of this fitted policy, solved anew for its `alpha`, leaving out the samples of one fold if asked.
+
+        With `alpha="cv"` λ is chosen anew as well, among the folds left. Costs no pass over the data: it is what
+        makes cross-validation of a whole policy cheap. Raises `DataError` where nothing is left to learn from.
+        """
+        check_is_fitted(self)
+        left = copy(self)
+        left.moments_ = [None if k == without else part for k, part in enumerate(self.moments_)]
+        if not any(part is not None for part in left.moments_):
+            raise DataError(
+                "all motion lies in one fold, so none is left without it: give more episodes, or no groups"
+            )
+        left._solve()
+        return left
 
     @abstractmethod
     def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:

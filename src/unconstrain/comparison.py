@@ -1,0 +1,256 @@
+"""Choosing among policies by what the recordings alone can tell: inconsistency on episodes held out.
+
+Every candidate is fitted once, its samples added up by fold. Leaving a fold out is a subtraction of its moments, so
+the solution without fold k, with λ chosen anew among the other folds, costs no second pass over the data. Its
+predictions for the episodes of fold k are held against their actions, and all folds' errors are pooled:
+
+    E_i = 1/N Σ_k Σ_(n in fold k) (r_n - û_nᵀ pi_(without k)(x_n))²
+
+The folds are the same for all candidates. What features take from the states alone (centres, knots, ranges) they
+take from all of them, as one fit does; nothing of a held-out action enters. No true policy is asked for: that the
+least inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that
+no episode ever moved in are not judged.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import joblib
+import numpy as np
+from sklearn.base import clone
+from sklearn.preprocessing import SplineTransformer
+
+from unconstrain import risk, selection
+from unconstrain.errors import PolicyError
+from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
+from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
+from unconstrain.policies.base import Policy
+from unconstrain.validation import check_actions, check_groups, check_samples
+
+# What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
+MOST_PARAMETERS = 1000
+MOST_CENTERS = 50
+
+
+@dataclass(frozen=True)
+class Row:
+    """One candidate's line of the comparison.
+
+    inconsistency: pooled over held-out samples, in squared units of the action; NaN where the candidate failed.
+    standard_error: of that, over folds. Candidates share the folds, so differences are surer than it says.
+    explained: share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
+    alpha: λ, as chosen on all the data. n_parameters: of all actions together. seconds: to fit and to hold out.
+    problem: the sentence that says why the candidate could not be fitted, else None.
+    """
+
+    name: str
+    inconsistency: float = np.nan
+    standard_error: float = np.nan
+    explained: float = np.nan
+    alpha: float = np.nan
+    n_parameters: int = 0
+    seconds: float = 0.0
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """The comparison: rows with the least inconsistent candidate first, and the failed ones last."""
+
+    rows: tuple[Row, ...]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __getitem__(self, name: str) -> Row:
+        """The row of the candidate of that name."""
+        for row in self.rows:
+            if row.name == name:
+                return row
+        raise KeyError(name)
+
+    def __str__(self) -> str:
+        """A Markdown table, its columns aligned."""
+        head = ("candidate", "held-out inconsistency", "explained", "λ", "parameters", "seconds")
+        lines = [head, *(_cells(row) for row in self.rows if row.problem is None)]
+        widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+        text = [_line([c.ljust(w) for c, w in zip(line, widths, strict=True)]) for line in lines]
+        text.insert(1, _line(["-" * w for w in widths]))
+        failed = [f"{row.name}: {row.problem}" for row in self.rows if row.problem is not None]
+        return "\n".join([*text, *([""] if failed else []), *failed])
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What `select_policy` found: `policy`, fitted to all the data; its `name`; and the comparison, `table`."""
+
+    policy: Policy
+    name: str
+    table: Table
+    policies: dict[str, Policy] = field(repr=False)
+    """All candidates that could be fitted, fitted to all the data, by name."""
+
+    def __str__(self) -> str:
+        return f"{self.table}\n\nchosen: {self.name}"
+
+
+def candidates(n: int, d: int) -> dict[str, Policy]:
+    """The candidates of "auto" for n states and d actions, all with λ by held-out inconsistency.
+
+    Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
+    even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
+    """
+    models = np.clip(
+        MOST_PARAMETERS**3 // (d * (n + 1)) ** 3, 1, MOST_CENTERS
+    )  # each solves for d (n + 1) numbers
+    centers = np.clip(MOST_PARAMETERS // d, 2, MOST_CENTERS)
+    named: dict[str, Policy] = {
+        "linear": ParametricPolicy(alpha="cv"),
+        "locally linear": LocallyLinearPolicy(n_centers=int(models), alpha="cv"),
+        "RBF": ParametricPolicy(NormalizedRBF(int(centers)), alpha="cv"),
+    }
+    knots = min(7, MOST_PARAMETERS // (n * d) - 2)
+    if knots >= 2:
+        splines = SplineTransformer(n_knots=knots, extrapolation="linear")
+        named["splines"] = ParametricPolicy(splines, alpha="cv")
+    if n == d:
+        named["decoupled"] = ParametricPolicy(DecoupledFeatures(), alpha="cv")
+        named["potential"] = ParametricPolicy(PotentialFeatures(NormalizedRBF(2 * MOST_CENTERS)), alpha="cv")
+    return named
+
+
+def select_policy(
+    candidates: str | Sequence[Policy] | Mapping[str, Policy],
+    X,
+    U,
+    groups=None,
+    *,
+    n_jobs: int | None = None,
+    progress: Callable[[Row], None] | None = None,
+) -> Selection:
+    """The candidate with the least inconsistency on held-out episodes, fitted to all the data.
+
+    candidates: policies in a list (each named after itself) or in a dict by name, or "auto" for those that
+        `candidates(n, d)` makes. They are cloned, never changed.
+    X (N, n), U (N, d): states and actions. groups (N,): episodes, which are held out whole; without them contiguous
+        blocks are.
+    n_jobs: candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
+    progress: called with each candidate's `Row` once it is done, in the order given.
+
+    A candidate that cannot be fitted to these data is listed with the reason. Raises `PolicyError` where none is
+    left or where a candidate is not a policy, and `DataError` for bad arrays, one episode alone, or no motion.
+
+    >>> import numpy as np, unconstrain as uc
+    >>> X = np.random.default_rng(0).normal(size=(200, 2))
+    >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
+    >>> U = np.einsum("nij,nj->ni", N, -np.tanh(X))
+    >>> uc.select_policy("auto", X, U).name
+    'decoupled'
+    """
+    X, _ = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
+    actions, groups = check_actions(U), check_groups(groups, len(X))
+    named = _named(candidates, X.shape[1], actions.shape[1])
+    list(selection.splits(len(X), groups))
+    selection.explained(actions, np.zeros_like(actions))
+
+    parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+    rows, policies = [], {}
+    judged = parallel(joblib.delayed(_judge)(name, policy, X, U, groups) for name, policy in named.items())
+    for row, policy in judged:
+        rows.append(row)
+        if policy is not None:
+            policies[row.name] = policy
+        if progress is not None:
+            progress(row)
+    rows.sort(key=lambda row: (row.problem is not None, row.inconsistency))
+    if rows[0].problem is not None:
+        raise PolicyError(
+            f"none of the candidates could be fitted; the first, {rows[0].name}: {rows[0].problem}"
+        )
+    return Selection(policies[rows[0].name], rows[0].name, Table(tuple(rows)), policies)
+
+
+def _named(given, n: int, d: int) -> dict[str, Policy]:
+    if isinstance(given, str):
+        if given != "auto":
+            raise PolicyError(
+                f'candidates must be policies, in a list or a dict by name, or "auto", got {given!r}'
+            )
+        return candidates(n, d)
+    named: dict[str, Policy] = {}
+    for key, policy in given.items() if isinstance(given, Mapping) else ((None, policy) for policy in given):
+        own = " ".join(repr(policy).split()) if key is None else str(key)
+        twins = sum(name == own or name.startswith(f"{own} (") for name in named)
+        named[f"{own} ({twins + 1})" if twins else own] = policy
+    if not named:
+        raise PolicyError("there are no candidates to choose from: give at least one policy")
+    for name, policy in named.items():
+        if not isinstance(policy, Policy):
+            raise PolicyError(
+                f"candidate {name} must be a policy of unconstrain, got {type(policy).__name__}"
+            )
+    return named
+
+
+def _judge(name: str, policy: Policy, X, U, groups) -> tuple[Row, Policy | None]:
+    start = time.perf_counter()
+    try:
+        fitted, predictions, fold = _hold_out(policy, X, U, groups)
+        actions = check_actions(U)
+        unit, lengths = risk.directions(actions)
+        errors = (lengths - np.einsum("nd,nd->n", unit, predictions)) ** 2
+        means = np.array([errors[fold == k].mean() for k in np.unique(fold)])
+        row = Row(
+            name,
+            inconsistency=risk.inconsistency(actions, predictions),
+            standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
+            explained=selection.explained(actions, predictions),
+            alpha=fitted.alpha_,
+            n_parameters=next(part.g.size for part in fitted.moments_ if part is not None),
+            seconds=time.perf_counter() - start,
+        )
+    except ValueError as error:  # ours, and those of transformers from elsewhere
+        sentence = " ".join(str(error).split())
+        return Row(name, seconds=time.perf_counter() - start, problem=sentence), None
+    return row, fitted
+
+
+def _hold_out(policy: Policy, X, U, groups) -> tuple[Policy, np.ndarray, np.ndarray]:
+    """The policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
+    fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups)
+    if policy.alpha != "cv":  # the folds are needed all the same, the choice is not
+        fitted = fitted.set_params(alpha=policy.alpha).solved()
+    fold = fitted.folds_.assign(groups, len(X))
+    predictions = np.empty((len(X), fitted.n_actions_))
+    seen = [k for k, part in enumerate(fitted.moments_) if part is not None]
+    for k in np.unique(fold):
+        if policy.alpha == "cv" and len(seen) - (k in seen) < 2:
+            # One fold is left, and λ is chosen within it.
+            train = fold != k
+            several = groups is not None and len(np.unique(groups[train])) > 1
+            left = clone(policy).fit(
+                X[train], np.asarray(U)[train], groups=groups[train] if several else None
+            )
+        else:
+            left = fitted.solved(without=k)
+        predictions[fold == k] = check_actions(left.predict(X[fold == k]), "predictions")
+    return fitted, predictions, fold
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    return (
+        row.name,
+        f"{row.inconsistency:.4g} ± {row.standard_error:.1g}",
+        f"{row.explained:.6f}",
+        f"{row.alpha:.2g}",
+        str(row.n_parameters),
+        f"{row.seconds:.2f}",
+    )
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

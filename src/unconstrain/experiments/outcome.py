@@ -1,0 +1,24 @@
+"""What an experiment leaves behind, the same for all, so that one page can show them all."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The results of one experiment, all files already written.
+
+    title: as a heading, "The toy limit cycle (Figs. 3 and 4)".
+    table: Markdown, "published | ours", or whatever the experiment compares.
+    figures: PNG files, in the order to be shown, with the caption of each.
+    choices: what was chosen where the paper is silent, a sentence each.
+    findings: what is worth saying about the figures, a sentence each; reached or missed targets among them.
+    files: everything else that was written (JSON of all trials, SVG, video).
+    """
+
+    title: str
+    table: str
+    figures: dict[Path, str] = field(default_factory=dict)
+    choices: tuple[str, ...] = ()
+    findings: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()

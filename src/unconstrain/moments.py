@@ -11,6 +11,8 @@ files and machines. Everything that is chosen or reported about a fit is compute
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from os import PathLike
+from typing import Any
 
 import numpy as np
 
@@ -119,3 +121,23 @@ class Spectrum:
         scaled = self.along[..., :, None, :] * (determined / denominator)[..., None]
         *batch, P, L, K = scaled.shape
         return (self.vectors @ scaled.reshape(*batch, P, L * K)).reshape(scaled.shape)
+
+
+def save(moments: Moments | Sequence[Moments | None], path: str | PathLike[str]) -> None:
+    """Write moments, one or by fold (as a policy's `moments_`), to an NPZ file, whole or not at all.
+
+    Raises `UnconstrainError` where the place cannot be written to. The layout is described in `moments_file`.
+    """
+    from unconstrain import moments_file  # which knows what moments are
+
+    moments_file.save(moments, path)
+
+
+def load(path: str | PathLike[str]) -> Any:
+    """The `Moments`, or list of them by fold (None where empty), that `save` wrote to `path`.
+
+    Raises `UnconstrainError` for a file that is missing, foreign, damaged, or from a newer release.
+    """
+    from unconstrain import moments_file
+
+    return moments_file.load(path)

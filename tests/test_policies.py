@@ -12,7 +12,7 @@ import unconstrain as uc
 from problems import problems, rotation
 from unconstrain.plants import toy
 
-RISKS = st.sampled_from(["inconsistency", "direct", "constrained"])
+RISKS = st.sampled_from(["auto", "inconsistency", "direct", "constrained"])
 
 
 @parametrize_with_checks(
@@ -55,7 +55,12 @@ def policies(X, name):
 
 
 def extra(name, N):
-    return {"projections": N} if name == "constrained" else {}
+    return {"projections": N} if name in ("constrained", "auto") else {}
+
+
+def partly_known(name, N):
+    """For "auto", every other projection is not known."""
+    return np.where(np.arange(len(N))[:, None, None] % 2, np.nan, N) if name == "auto" else N
 
 
 def assert_same(A, B):
@@ -66,6 +71,7 @@ def assert_same(A, B):
 @given(problems(min_samples=6), RISKS, st.floats(0.35, 0.8))
 def test_partial_fit_in_pieces_equals_fit(problem, name, share):
     X, _, N, U, rng = problem
+    N = partly_known(name, N)
     weights, cut = rng.random(len(X)) + 0.1, max(3, int(share * len(X)))
     if not np.any(U[:cut]):
         return
@@ -83,6 +89,7 @@ def test_partial_fit_in_pieces_equals_fit(problem, name, share):
 @given(problems(min_samples=6), RISKS)
 def test_order_of_samples_does_not_matter(problem, name):
     X, _, N, U, rng = problem
+    N = partly_known(name, N)
     if not np.any(U):
         return
     order = rng.permutation(len(X))
@@ -95,6 +102,7 @@ def test_order_of_samples_does_not_matter(problem, name):
 @given(problems(min_samples=6), RISKS, st.floats(0.01, 100.0))
 def test_scaling_actions_scales_the_policy(problem, name, c):
     X, _, N, U, _ = problem
+    N = partly_known(name, N)
     if not np.any(U):
         return
     for policy in policies(X, name):
@@ -106,6 +114,7 @@ def test_scaling_actions_scales_the_policy(problem, name, c):
 @given(problems(min_samples=6), RISKS)
 def test_rotating_the_action_space_rotates_the_policy(problem, name):
     X, _, N, U, rng = problem
+    N = partly_known(name, N)
     if not np.any(U):
         return
     R = rotation(U.shape[1], rng)
@@ -232,12 +241,19 @@ X, U = np.eye(4)[:, :2], np.ones((4, 2))
             lambda: uc.ParametricPolicy().fit(X, U).partial_fit(X, U[:, :1]),
             "1 dimensions, but this policy has learnt 2",
         ),
-        (lambda: uc.ParametricPolicy(risk="naive").fit(X, U), "risk must be one of 'inconsistency'"),
+        (lambda: uc.ParametricPolicy(risk="naive").fit(X, U), "risk must be one of 'auto', 'inconsistency'"),
         (lambda: uc.ParametricPolicy(alpha="best").fit(X, U), "alpha, where it is not a number"),
         (lambda: uc.ParametricPolicy(alpha=-1).fit(X, U), "alpha must be a finite number of at least zero"),
         (lambda: uc.ParametricPolicy(3).fit(X, U), "features must be"),
         (lambda: uc.ParametricPolicy(risk="constrained").fit(X, U), "needs the projections"),
-        (lambda: uc.ParametricPolicy().fit(X, U, projections=np.zeros((4, 2, 2))), "projections are for"),
+        (
+            lambda: uc.ParametricPolicy(risk="direct").fit(X, U, projections=np.zeros((4, 2, 2))),
+            "projections are for",
+        ),
+        (
+            lambda: uc.ParametricPolicy(risk="constrained").fit(X, U, projections=np.full((4, 2, 2), np.nan)),
+            'row 0 is NaN, that is, not known: .* risk="auto"',
+        ),
         (lambda: uc.ParametricPolicy(alpha="cv").fit(X, U, groups=[1] * 4), "at least two episodes"),
         (lambda: uc.ParametricPolicy().fit(X, U, groups=[1]), "one episode label a sample"),
         (lambda: uc.LocallyLinearPolicy(width=0).fit(X, U), "width must be a finite number above zero"),

@@ -45,6 +45,7 @@ def test_every_risk_is_what_its_sight_sees(problem):
         "inconsistency": risk.inconsistency(U, P),
         "direct": risk.direct(U, P),
         "constrained": risk.constrained_policy_error(Pi, P, N),
+        "auto": risk.auto(U, P, N),
     }
     for name in risk.RISKS:
         seen = risk.sight(name, U, N)

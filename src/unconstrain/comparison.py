@@ -9,7 +9,8 @@ predictions for the episodes of fold k are held against their actions, and all f
 The folds are the same for all candidates. What features take from the states alone (centres, knots, ranges) they
 take from all of them, as one fit does; nothing of a held-out action enters. No true policy is asked for: that the
 least inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that
-no episode ever moved in are not judged.
+no episode ever moved in are not judged. Where projections of some samples are known, their error is that under the
+constraint (`risk.auto`), which judges more of the policy.
 """
 
 import time
@@ -26,7 +27,7 @@ from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
-from unconstrain.validation import check_actions, check_groups, check_samples
+from unconstrain.validation import check_actions, check_groups, check_projections, check_samples
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
@@ -37,7 +38,8 @@ MOST_CENTERS = 50
 class Row:
     """One candidate's line of the comparison.
 
-    inconsistency: pooled over held-out samples, in squared units of the action; NaN where the candidate failed.
+    inconsistency: pooled over held-out samples, in squared units of the action; NaN where the candidate failed. With
+        projections given it is `risk.auto`.
     standard_error: of that, over folds. Candidates share the folds, so differences are surer than it says.
     explained: share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
     alpha: λ, as chosen on all the data. n_parameters: of all actions together. seconds: to fit and to hold out.
@@ -129,6 +131,7 @@ def select_policy(
     U,
     groups=None,
     *,
+    projections=None,
     n_jobs: int | None = None,
     progress: Callable[[Row], None] | None = None,
 ) -> Selection:
@@ -154,12 +157,16 @@ def select_policy(
     X, _ = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
     named = _named(candidates, X.shape[1], actions.shape[1])
+    if projections is not None:
+        projections = check_projections(projections, *actions.shape, unknown=True)
     list(selection.splits(len(X), groups))
     selection.explained(actions, np.zeros_like(actions))
 
     parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
     rows, policies = [], {}
-    judged = parallel(joblib.delayed(_judge)(name, policy, X, U, groups) for name, policy in named.items())
+    judged = parallel(
+        joblib.delayed(_judge)(name, policy, X, U, groups, projections) for name, policy in named.items()
+    )
     for row, policy in judged:
         rows.append(row)
         if policy is not None:
@@ -196,19 +203,20 @@ def _named(given, n: int, d: int) -> dict[str, Policy]:
     return named
 
 
-def _judge(name: str, policy: Policy, X, U, groups) -> tuple[Row, Policy | None]:
+def _judge(name: str, policy: Policy, X, U, groups, projections) -> tuple[Row, Policy | None]:
     start = time.perf_counter()
     try:
-        fitted, predictions, fold = _hold_out(policy, X, U, groups)
+        taken = projections if policy.risk in ("auto", "constrained") else None
+        fitted, predictions, fold = _hold_out(policy, X, U, groups, taken)
         actions = check_actions(U)
-        unit, lengths = risk.directions(actions)
-        errors = (lengths - np.einsum("nd,nd->n", unit, predictions)) ** 2
+        seen = risk.sight("auto", actions, projections)
+        errors = np.sum((seen.targets - np.einsum("nkd,nd->nk", seen.rows, predictions)) ** 2, axis=1)
         means = np.array([errors[fold == k].mean() for k in np.unique(fold)])
         row = Row(
             name,
-            inconsistency=risk.inconsistency(actions, predictions),
+            inconsistency=float(errors.mean()),
             standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
-            explained=selection.explained(actions, predictions),
+            explained=1.0 - float(errors.sum() / seen.squares.sum()),
             alpha=fitted.alpha_,
             n_parameters=next(part.g.size for part in fitted.moments_ if part is not None),
             seconds=time.perf_counter() - start,
@@ -219,9 +227,9 @@ def _judge(name: str, policy: Policy, X, U, groups) -> tuple[Row, Policy | None]
     return row, fitted
 
 
-def _hold_out(policy: Policy, X, U, groups) -> tuple[Policy, np.ndarray, np.ndarray]:
+def _hold_out(policy: Policy, X, U, groups, projections) -> tuple[Policy, np.ndarray, np.ndarray]:
     """The policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
-    fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups)
+    fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)
     if policy.alpha != "cv":  # the folds are needed all the same, the choice is not
         fitted = fitted.set_params(alpha=policy.alpha).solved()
     fold = fitted.folds_.assign(groups, len(X))
@@ -233,7 +241,10 @@ def _hold_out(policy: Policy, X, U, groups) -> tuple[Policy, np.ndarray, np.ndar
             train = fold != k
             several = groups is not None and len(np.unique(groups[train])) > 1
             left = clone(policy).fit(
-                X[train], np.asarray(U)[train], groups=groups[train] if several else None
+                X[train],
+                np.asarray(U)[train],
+                groups=groups[train] if several else None,
+                projections=None if projections is None else projections[train],
             )
         else:
             left = fitted.solved(without=k)

@@ -1,4 +1,4 @@
-"""What a policy is measured by: four risks that differ only in the projection before the error.
+"""What a policy is measured by: risks that differ only in the projection before the error.
 
 Every risk here is a mean over samples of a squared error behind a projection,
 
@@ -11,11 +11,15 @@ where the rows of `Q_n` (k x d) say what of the action is looked at:
 | direct        | I              | ‖u_n - p_n‖²             | data             |
 | constrained   | N_n            | ‖u_n - N_n p_n‖²         | true projections |
 | inconsistency | û_nᵀ           | (r_n - û_nᵀ p_n)²        | data             |
+| auto          | N_n or û_nᵀ    | whichever is known       | some projections |
 
 with `r = ‖u‖` and `û = u / r`. `û ûᵀ` projects onto a line that surely lies in the image of the unknown
-`N`, so the true policy has no inconsistency, whatever the constraints were, and for every model
+`N`, so the true policy has no inconsistency, whatever the constraints were. "auto" uses the projection of every
+sample whose constraint is known (measured, computed, learnt) and the line of every other. For every model
 
-    inconsistency <= constrained policy error <= unconstrained policy error.
+    inconsistency <= auto <= constrained policy error <= unconstrained policy error.
+
+What is known of a sample that does not move counts as well: `N pi = 0` there. Without it there is nothing to see.
 
 Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) to (7).
 """
@@ -27,7 +31,7 @@ import numpy as np
 from unconstrain.errors import DataError
 from unconstrain.validation import check_actions, check_projections
 
-RISKS = ("inconsistency", "direct", "constrained")
+RISKS = ("auto", "inconsistency", "direct", "constrained")
 
 # An action this much shorter than the longest one is rounding left by a projection that blocked all motion:
 # its direction is noise, and would be taught as truth.
@@ -79,11 +83,33 @@ class Sight:
         return np.einsum("nk,nk->n", self.targets, self.targets)
 
 
+def unknown(projections: np.ndarray) -> np.ndarray:
+    """Which of the projections (N, d, d) are not known, as a mask (N,): those that are NaN."""
+    return np.isnan(projections).any(axis=(1, 2))
+
+
+def informative(projections: np.ndarray) -> np.ndarray:
+    """Which projections (N, d, d) say something of the policy even where nothing moves, as a mask (N,)."""
+    return ~unknown(projections) & projections.any(axis=(1, 2))
+
+
 def sight(risk: str, U: np.ndarray, projections: np.ndarray | None = None) -> Sight:
-    """What `risk`, one of `RISKS`, sees of actions U (N, d); `projections` (N, d, d) for "constrained"."""
-    if risk == "inconsistency":
+    """What `risk`, one of `RISKS`, sees of actions U (N, d).
+
+    projections: (N, d, d), for "constrained" and "auto"; for "auto" NaN where they are not known, or None.
+    """
+    hidden = unknown(projections) if risk == "auto" and projections is not None else None
+    if risk == "inconsistency" or (risk == "auto" and (hidden is None or hidden.all())):
         unit, lengths = directions(U)
         return Sight(unit[:, None, :], lengths[:, None])
+    if risk == "auto":
+        assert projections is not None
+        assert hidden is not None
+        unit, lengths = directions(U)
+        rows = np.where(hidden[:, None, None], 0.0, projections)
+        targets = np.einsum("nij,nj->ni", rows, U)
+        rows[hidden, 0], targets[hidden, 0] = unit[hidden], lengths[hidden]
+        return Sight(rows, targets)
     if risk == "constrained":
         # An orthogonal projection is its own Q: NᵀN = N.
         assert projections is not None
@@ -107,6 +133,17 @@ def direct(U, P) -> float:
     """Mean direct risk `1/N Σ ‖u_n - p_n‖²`, what ordinary regression minimises. U, P (N, d)."""
     U, P = _pair(U, P, "actions", "predictions")
     return float(np.mean(np.sum((U - P) ** 2, axis=1)))
+
+
+def auto(U, P, N) -> float:
+    """Mean risk of what is known, `1/N Σ ‖Q_n (u_n - p_n)‖²`: Q is the projection, or ûᵀ where that is not known.
+
+    In squared units of the action. U (N, d) actions, P (N, d) predictions, N (N, d, d) projections, those not known
+    all NaN. Zero actions whose projection is not known add nothing, and are counted, as in `inconsistency`.
+    """
+    U, P = _pair(U, P, "actions", "predictions")
+    seen = sight("auto", U, check_projections(N, *U.shape, unknown=True))
+    return float(np.mean(np.sum((seen.targets - np.einsum("nkd,nd->nk", seen.rows, P)) ** 2, axis=1)))
 
 
 def constrained_policy_error(Pi, P, N) -> float:

@@ -73,15 +73,24 @@ def check_actions(U, name: str = "actions") -> np.ndarray:
     return U
 
 
-def check_projections(projections, n_samples: int, n_actions: int) -> np.ndarray:
-    """Nullspace projections as an (N, d, d) finite float array. Raises `DataError` otherwise."""
+def check_projections(projections, n_samples: int, n_actions: int, *, unknown: bool = False) -> np.ndarray:
+    """Nullspace projections as an (N, d, d) finite float array. Raises `DataError` otherwise.
+
+    With `unknown`, those that are not known may be NaN, as a whole.
+    """
     N = np.asarray(projections, dtype=np.float64)
     if N.shape != (n_samples, n_actions, n_actions):
         raise DataError(
             f"projections must have shape {(n_samples, n_actions, n_actions)}, one d x d matrix a sample, "
             f"got {N.shape}"
         )
-    check_finite(N.reshape(n_samples, -1), "projections")
+    flat = N.reshape(n_samples, -1)
+    if not unknown and np.isnan(flat).all(axis=1).any():
+        raise DataError(
+            f"the projection of row {np.argmax(np.isnan(flat).all(axis=1))} is NaN, that is, not known: "
+            'leave such samples out, or choose risk="auto", which does without'
+        )
+    check_finite(np.where(np.isnan(flat).all(axis=1, keepdims=True), 0.0, flat), "projections")
     return N
 
 

@@ -35,7 +35,7 @@ class LocallyLinearPolicy(Policy):
         centers="coverage",
         coverage=0.7,
         n_centers=30,
-        risk="inconsistency",
+        risk="auto",
         alpha=1e-6,
         random_state=0,
     ):

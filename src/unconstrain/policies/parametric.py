@@ -16,8 +16,9 @@ class ParametricPolicy(Policy):
 
     features: any scikit-learn transformer whose output is `b(x)` (`NormalizedRBF`, `SplineTransformer`, ...), shared
         by all actions; policy features (see `features.base`); or None for the linear policy, `b(x) = (x, 1)`.
-    risk: "inconsistency" (needs only the data), "direct" (ordinary regression; also the oracle, when fitted to the
-        true policy), or "constrained" (needs `projections` in `fit`).
+    risk: "auto" (the inconsistency, which needs only the data; for samples whose constraint is known, given as
+        `projections` to `fit`, the error under it), "inconsistency" (whatever is known), "direct" (ordinary regression;
+        also the oracle, when fitted to the true policy), or "constrained" (needs the projections of all samples).
     alpha: the weight decay λ of `E(w) + λ‖w‖²`, with E the sum of squared errors over samples; or "cv" to choose
         it by held-out risk among 25 values over five folds of episodes.
 
@@ -34,7 +35,7 @@ class ParametricPolicy(Policy):
     True
     """
 
-    def __init__(self, features=None, *, risk="inconsistency", alpha=1e-6):
+    def __init__(self, features=None, *, risk="auto", alpha=1e-6):
         self.features = features
         self.risk = risk
         self.alpha = alpha

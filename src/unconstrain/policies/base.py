@@ -1,5 +1,6 @@
 """What the policies share: scikit-learn's contract, moments by fold, λ, and what a fit reports."""
 
+import math
 from abc import ABC, abstractmethod
 from copy import copy
 from pathlib import Path
@@ -13,6 +14,7 @@ from unconstrain import selection
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.moments import Moments
 from unconstrain.policies import persistence
+from unconstrain.policies.tally import Tally
 from unconstrain.validation import (
     check_actions,
     check_choice,
@@ -24,6 +26,11 @@ from unconstrain.validation import (
     check_weights,
 )
 
+NO_DIRECTION = (
+    "all actions are zero, and a zero action has no direction to learn from: check the action columns, "
+    "or differentiate the states over a longer window"
+)
+
 
 class Policy(RegressorMixin, BaseEstimator, ABC):
     """Base of the estimators: `u = pi(x)`, linear in its parameters, fitted by adding up moments.
@@ -33,8 +40,12 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     """
 
     moments_: list[Moments | None]  # by fold; None where a fold has no samples yet
+    folds_: selection.EpisodeFolds  # with alpha="cv"
     n_actions_: int
+    n_samples_seen_: int
+    n_zero_actions_: int
     longest_action_: float
+    shortest_action_: float
 
     def fit(self, X, y, *, groups=None, sample_weight=None, projections=None):
         """Learn from states X (N, n) and actions y (N, d), or (N,) for d = 1.
@@ -121,11 +132,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         """Actions (N, d) at checked states X (N, n)."""
 
     def _add(self, X, y, groups, sample_weight, projections, *, first: bool):
-        check_choice(self.risk, "risk", risks.RISKS)
-        if isinstance(self.alpha, str):
-            check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
-        else:
-            check_number(self.alpha, "alpha", positive=False)
+        self._check_options()
         U = check_actions(y)
         weights = check_weights(sample_weight, X)
         groups = check_groups(groups, len(X))
@@ -134,41 +141,89 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             raise DataError(
                 f"actions have {U.shape[1]} dimensions, but this policy has learnt {self.n_actions_}"
             )
-
-        scale = max(np.linalg.norm(U, axis=1).max(), 0.0 if first else self.longest_action_)
-        moves = risks.moving(U, scale)
-        kept = self._counted(moves, weights, N)
-        if not kept.any() and first:
-            raise DataError(
-                "all actions are zero, and a zero action has no direction to learn from: check the action columns, "
-                "or differentiate the states over a longer window"
-            )
-        fold = self._fold_of_samples(groups, len(X), first)
+        longest = max(np.linalg.norm(U, axis=1).max(), 0.0 if first else self.longest_action_)
         if first:
-            self._place(X[kept], U.shape[1], weights[kept])
-            self.moments_ = [None] * (fold.max(initial=0) + 1)
-            self.n_actions_ = U.shape[1]
-            self.actions_are_scalars_ = np.ndim(y) == 1
-            self.n_samples_seen_, self.n_zero_actions_ = 0, 0
-        self.longest_action_ = float(scale)
-        self.n_samples_seen_ += len(U)
-        self.n_zero_actions_ += int(np.count_nonzero(~moves))
-
-        seen = risks.sight(self.risk, U, N)
-        self.moments_ += [None] * (fold.max(initial=0) + 1 - len(self.moments_))
-        for k in np.unique(fold[kept]):
-            rows = kept & (fold == k)
-            index = slice(None) if rows.all() else np.flatnonzero(rows)
-            part = self._moments(X[index], seen[index], weights[index])
-            self.moments_[k] = part if self.moments_[k] is None else self.moments_[k] + part
+            counted = self._counted(risks.moving(U, longest), weights, N)
+            if not counted.any():
+                raise DataError(NO_DIRECTION)
+            self._begin(X[counted], U.shape[1], weights[counted], scalars=np.ndim(y) == 1)
+        fold = self.folds_.assign(groups, len(X)) if self.alpha == "cv" else None
+        self._include(self._tally(X, U, fold, weights, N, longest))
         self._solve()
         return self
+
+    def _check_options(self) -> None:
+        check_choice(self.risk, "risk", risks.RISKS)
+        if isinstance(self.alpha, str):
+            check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
+        else:
+            check_number(self.alpha, "alpha", positive=False)
+
+    def _begin(self, X: np.ndarray, d: int, weights: np.ndarray, *, scalars: bool) -> None:
+        """Place what depends on data by states X (N, n), weighted (N,), and forget what was added before."""
+        self._place(X, d, weights)
+        self.moments_ = []
+        self.n_actions_ = d
+        self.actions_are_scalars_ = scalars
+        self.n_samples_seen_, self.n_zero_actions_ = 0, 0
+        self.longest_action_, self.shortest_action_ = 0.0, math.inf
+        if self.alpha == "cv":
+            self.folds_ = selection.EpisodeFolds()
+
+    def _tally(
+        self,
+        X: np.ndarray,
+        U: np.ndarray,
+        fold: np.ndarray | None = None,
+        weights: np.ndarray | None = None,
+        projections: np.ndarray | None = None,
+        longest: float = 0.0,
+    ) -> Tally:
+        """What checked samples add, by fold (N,), once all is placed. Changes nothing here, so threads may share it.
+
+        `longest`: the longest action known so far, if that is not among these.
+        """
+        lengths = np.sqrt(np.einsum("nd,nd->n", U, U))
+        longest = max(float(lengths.max(initial=0.0)), longest)
+        moves = lengths > risks.NO_MOTION * longest
+        weights = np.ones(len(U)) if weights is None else weights
+        counted = self._counted(moves, weights, projections)
+        seen = risks.sight(self.risk, U, projections)
+        moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
+        for k in [0] if fold is None else np.unique(fold[counted]):
+            rows = counted if fold is None else counted & (fold == k)
+            if rows.all():
+                moments[k] = self._moments(X, seen, weights)
+            elif rows.any():
+                index = np.flatnonzero(rows)
+                moments[k] = self._moments(X[index], seen[index], weights[index])
+        return Tally(
+            tuple(moments),
+            len(U),
+            len(U) - int(np.count_nonzero(moves)),
+            longest,
+            float(lengths.min(initial=math.inf, where=moves)),
+        )
 
     def _counted(self, moves: np.ndarray, weights: np.ndarray, projections: np.ndarray | None) -> np.ndarray:
         """Which samples say something, (N,): without motion or a projection there is no direction to say it of."""
         if self.risk == "auto" and projections is not None:
             moves = moves | risks.informative(projections)
         return (moves | (self.risk in ("direct", "constrained"))) & (weights > 0)
+
+    def _include(self, tally: Tally) -> None:
+        total = Tally(
+            tuple(self.moments_),
+            self.n_samples_seen_,
+            self.n_zero_actions_,
+            self.longest_action_,
+            # Policies saved before this was kept know no shorter one than any.
+            getattr(self, "shortest_action_", math.inf),
+        )
+        total += tally
+        self.moments_ = list(total.moments)
+        self.n_samples_seen_, self.n_zero_actions_ = total.n_samples, total.n_zero
+        self.longest_action_, self.shortest_action_ = total.longest, total.shortest
 
     def _checked_projections(self, projections, U: np.ndarray) -> np.ndarray | None:
         if self.risk not in ("auto", "constrained") and projections is not None:
@@ -182,13 +237,6 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
                 'risk="constrained" needs the projections of the samples: fit(X, U, projections=N)'
             )
         return check_projections(projections, *U.shape, unknown=self.risk == "auto")
-
-    def _fold_of_samples(self, groups, n_samples: int, first: bool) -> np.ndarray:
-        if self.alpha != "cv":
-            return np.zeros(n_samples, dtype=int)
-        if first:
-            self.folds_ = selection.EpisodeFolds()
-        return self.folds_.assign(groups, n_samples)
 
     def _solve(self) -> None:
         folds = [fold for fold in self.moments_ if fold is not None]

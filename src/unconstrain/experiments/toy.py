@@ -61,7 +61,7 @@ def errors(policy: ParametricPolicy, held_out: Demonstrations) -> dict[str, floa
 def learn(
     demonstrations: Demonstrations, kind: str = "inconsistency", movements: int = MOVEMENTS
 ) -> ParametricPolicy:
-    """The policy learnt from the first so many movements; `kind` "oracle" is regression on the true policy."""
+    """The policy learnt from the first `movements`; `kind` "oracle" is regression on the true policy."""
     seen = demonstrations.select(demonstrations.episodes < movements)
     if kind == "oracle":
         return model("direct").fit(seen.states, seen.policy, groups=seen.episodes)
@@ -103,8 +103,8 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
     captions = {
         "fig3": "Fig. 3 anew: the true policy; learnt from 4 and from 40 constrained movements; ordinary regression on "
         "the same 40. Dotted: movements.",
-        "fig4": f"Fig. 4 anew: errors against the size of the data set and against noise, mean over {trials} data sets, "
-        "from the 10th to the 90th percentile shaded.",
+        "fig4": f"Fig. 4 anew: errors against the size of the data set and against noise; mean over {trials} data "
+        "sets, from the 10th to the 90th percentile shaded.",
     }
     return Outcome(
         title="The toy limit cycle (Figs. 3 and 4)",

@@ -141,10 +141,12 @@ def test_a_joint_that_never_moves_is_learnt_as_a_constant():
     assert np.isfinite(policy.predict([[0.0, 0.0]])).all()
 
 
-def test_beyond_the_data_a_decoupled_policy_goes_on_straight():
-    X = np.linspace(-1, 1, 300)[:, None]
-    policy = uc.ParametricPolicy(uc.DecoupledFeatures(), alpha=1e-9).fit(X, -2 * X)
-    np.testing.assert_allclose(policy.predict([[-5.0], [5.0]]), [[10.0], [-10.0]], atol=1e-4)
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_beyond_the_data_a_decoupled_policy_goes_on_straight(degree):
+    X = np.random.default_rng(0).uniform(-1, 1, size=(300, 3))
+    policy = uc.ParametricPolicy(uc.DecoupledFeatures(degree=degree), alpha=1e-9).fit(X, -2 * X)
+    far = np.array([[-5.0, 5.0, 0.0], [5.0, -0.5, -5.0]])
+    np.testing.assert_allclose(policy.predict(far), -2 * far, atol=1e-4)
 
 
 @pytest.mark.parametrize("features", SQUARE)

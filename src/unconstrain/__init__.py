@@ -12,7 +12,7 @@ from unconstrain import constraints, errors, features, risk
 from unconstrain.comparison import select_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
-from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_policy
+from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
 from unconstrain.readers import load, save
 
 __version__ = version("unconstrain")
@@ -28,6 +28,7 @@ __all__ = [
     "errors",
     "features",
     "load",
+    "load_compiled",
     "load_policy",
     "risk",
     "save",

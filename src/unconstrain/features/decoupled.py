@@ -74,8 +74,10 @@ class DecoupledFeatures(BaseEstimator):
         still = high - low <= NO_RANGE * np.maximum(np.abs(low), np.abs(high))
         margin = np.where(still, 0.5 * np.maximum(np.abs(low), 1.0), 0.0)
         knots = np.linspace(low - margin, high + margin, self.n_knots)
+        # For straight pieces both are the same, but scikit-learn 1.9 gets "linear" right in the first dimension only.
+        straight = self.degree == 1 and self.extrapolation == "linear"
         self.splines_ = SplineTransformer(
-            knots=knots, degree=self.degree, extrapolation=self.extrapolation
+            knots=knots, degree=self.degree, extrapolation="continue" if straight else self.extrapolation
         ).fit(knots)
         self.n_actions_ = d
         self.n_basis_ = self.n_knots + self.degree - 1  # of one dimension

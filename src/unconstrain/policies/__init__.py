@@ -1,7 +1,8 @@
 """Policies as scikit-learn estimators."""
 
+from unconstrain.policies.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.policies.persistence import load_policy
 
-__all__ = ["LocallyLinearPolicy", "ParametricPolicy", "load_policy"]
+__all__ = ["CompiledPolicy", "LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"]

@@ -13,7 +13,8 @@ from unconstrain import risk as risks
 from unconstrain import selection
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.moments import Moments
-from unconstrain.policies import persistence
+from unconstrain.policies import compilation, onnx, persistence
+from unconstrain.policies.compiled import CompiledPolicy
 from unconstrain.policies.tally import Tally
 from unconstrain.validation import (
     check_actions,
@@ -98,6 +99,23 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         """Write the policy to `path` (customarily `.skops`), to be read by `load_policy`. Holds no pickle."""
         check_is_fitted(self)
         persistence.save(self, path)
+
+    def compile(self) -> CompiledPolicy:
+        """The fitted policy for a control loop: `step = policy.compile()`; `step(x)` for a state (n,) or a batch (N, n).
+
+        A small immutable callable that does not need scikit-learn and agrees with `predict` to 1e-12 of the largest
+        term either adds up, which is checked here. See `CompiledPolicy`. Raises `PolicyError` for features that
+        cannot be compiled.
+        """
+        return compilation.compile_policy(self)
+
+    def to_onnx(self, path: str | Path) -> None:
+        """Write the policy to `path` as an ONNX model: input "x" (batch, n), output "u" (batch, d), float64.
+
+        Needs the extra `onnx`. Raises `PolicyError` without it, and for policies that are neither linear, nor of
+        normalised RBFs, nor locally linear.
+        """
+        onnx.save(self.compile(), path)
 
     def solved(self, *, without: int | None = None):
         """A copy of this fitted policy, solved anew for its `alpha`, leaving out the samples of one fold if asked.

@@ -16,6 +16,7 @@ from unconstrain.moments import Moments
 from unconstrain.policies import compilation, onnx, persistence
 from unconstrain.policies.compiled import CompiledPolicy
 from unconstrain.policies.tally import Tally
+from unconstrain.uncertainty import Posterior
 from unconstrain.validation import (
     check_actions,
     check_choice,
@@ -73,14 +74,34 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         X, y = check_samples(self, X, y, reset=first, min_samples=2 if first else 1)
         return self._add(X, y, groups, sample_weight, projections, first=first)
 
-    def predict(self, X) -> np.ndarray:
+    def predict(self, X, return_std: bool = False, return_cov: bool = False):
         """Actions (N, d) at states X (N, n); (N,) if the policy was fitted to actions of that shape.
 
-        Raises `DataError` for states that are not finite or not of the dimension learnt.
+        return_std: also how far the policy may be from that, as standard deviations of the actions' shape.
+        return_cov: also the covariances (N, d, d) of all actions; (N,) for actions (N,). Not both. See `uncertainty`.
+
+        Raises `DataError` for states that are not finite or not of the dimension learnt, `PolicyError` for both.
         """
         check_is_fitted(self)
-        actions = self._evaluate(check_states(self, X))
-        return actions[:, 0] if self.actions_are_scalars_ else actions
+        if return_std and return_cov:
+            raise PolicyError(
+                "ask for return_std or return_cov, not both: the deviations are the roots of the covariance's diagonal"
+            )
+        X = check_states(self, X)
+        actions = self._evaluate(X)
+        if not (return_std or return_cov):
+            return actions[:, 0] if self.actions_are_scalars_ else actions
+        covariance = self._deviation(X, actions, self.posterior())
+        spread = covariance if return_cov else np.sqrt(np.maximum(np.einsum("njj->nj", covariance), 0.0))
+        if self.actions_are_scalars_:
+            return actions[:, 0], spread.reshape(len(X))
+        return actions, spread
+
+    def posterior(self) -> Posterior:
+        """What the samples say of the parameters and of their own noise: see `uncertainty`. Costs a decomposition."""
+        check_is_fitted(self)
+        seen = Moments.sum([fold for fold in self.moments_ if fold is not None])
+        return Posterior.of(seen, self.n_actions_ if self.risk == "direct" else 1)
 
     def score(self, X, y, sample_weight=None) -> float:
         """Share of observed motion explained, `1 - Σ (r - û·pi(x))² / Σ r²`, at most 1.
@@ -137,6 +158,10 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:
         """Fix what depends on data before any sample is added."""
 
+    def _placed_by_data(self) -> bool:
+        """Whether `_place` depends on where the states lie, and not just on their dimension."""
+        return True
+
     @abstractmethod
     def _moments(self, X: np.ndarray, seen: risks.Sight, weights: np.ndarray) -> Moments:
         """The samples, added up."""
@@ -146,8 +171,16 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         """Keep the solution w (..., P), in the order of the rows of W, as learnt attributes."""
 
     @abstractmethod
+    def _parameters(self) -> np.ndarray:
+        """What `_take_up` took up: w (..., P), in the order of the rows of W."""
+
+    @abstractmethod
     def _evaluate(self, X: np.ndarray) -> np.ndarray:
         """Actions (N, d) at checked states X (N, n)."""
+
+    @abstractmethod
+    def _deviation(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
+        """Second moments (N, d, d) of what separates the policy from predictions P (N, d), at checked states."""
 
     def _add(self, X, y, groups, sample_weight, projections, *, first: bool):
         self._check_options()

@@ -7,6 +7,7 @@ from unconstrain.features.centers import normalized_activations, place
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
 from unconstrain.risk import Sight
+from unconstrain.uncertainty import Posterior, local_covariance
 from unconstrain.validation import check_number
 
 BLOCK_ROWS = 4096
@@ -58,12 +59,18 @@ class LocallyLinearPolicy(Policy):
             random_state=self.random_state,
         )
 
+    def _placed_by_data(self) -> bool:
+        return isinstance(self.centers, str) or self.width is None
+
     def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
         return local_moments(self.centers_, self.width_, X, seen, weights)
 
     def _take_up(self, w: np.ndarray) -> None:
         models = w.reshape(len(w), self.n_actions_, -1)
         self.coef_, self.intercept_ = models[:, :, :-1].copy(), models[:, :, -1].copy()
+
+    def _parameters(self) -> np.ndarray:
+        return np.concatenate([self.coef_, self.intercept_[:, :, None]], axis=2).reshape(len(self.coef_), -1)
 
     def _evaluate(self, X: np.ndarray) -> np.ndarray:
         actions = np.empty((len(X), self.n_actions_))
@@ -74,3 +81,6 @@ class LocallyLinearPolicy(Policy):
             local = (block @ slopes).reshape(len(block), *self.intercept_.shape) + self.intercept_
             actions[start : start + BLOCK_ROWS] = np.einsum("nm,nmd->nd", blend, local)
         return actions
+
+    def _deviation(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
+        return local_covariance(self.centers_, self.width_, X, P, posterior)

@@ -9,6 +9,7 @@ from unconstrain.features.base import is_policy_features
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
 from unconstrain.risk import Sight
+from unconstrain.uncertainty import Posterior, parametric_covariance
 
 
 class ParametricPolicy(Policy):
@@ -44,11 +45,20 @@ class ParametricPolicy(Policy):
         features = clone(self.features) if is_policy_features(self.features) else FullFeatures(self.features)
         self.features_ = features.fit(X, d, weights)
 
+    def _placed_by_data(self) -> bool:
+        return self.features is not None
+
     def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
         return parametric_moments(self.features_, X, seen, weights)
 
     def _take_up(self, w: np.ndarray) -> None:
         self.weights_ = w
 
+    def _parameters(self) -> np.ndarray:
+        return self.weights_
+
     def _evaluate(self, X: np.ndarray) -> np.ndarray:
         return self.features_.evaluate(X, self.weights_)
+
+    def _deviation(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
+        return parametric_covariance(self.features_, X, P, posterior)

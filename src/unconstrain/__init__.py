@@ -12,6 +12,7 @@ from unconstrain import constraints, errors, features, risk
 from unconstrain.comparison import select_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
+from unconstrain.identifiability import identifiability
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
 from unconstrain.readers import load, save
 
@@ -27,6 +28,7 @@ __all__ = [
     "constraints",
     "errors",
     "features",
+    "identifiability",
     "load",
     "load_compiled",
     "load_policy",

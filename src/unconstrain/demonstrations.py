@@ -32,6 +32,10 @@ class Demonstrations:
         The true unconstrained action π(x), known only in simulation.
     projections : array (N, d, d), optional
         The true nullspace projections N(x), known only in simulation.
+    forces : array (N, m), optional
+        Measured contact forces; see `constraints.from_recording`.
+    free : array (N,), optional
+        1 where the demonstrator says that nothing constrained the motion, else 0.
     state_names, action_names : sequence of str, optional
         Default x1, x2, ... and u1, u2, ...
     episode_labels : sequence of str, optional
@@ -41,7 +45,7 @@ class Demonstrations:
 
     Attributes
     ----------
-    states, actions, time, policy, projections
+    states, actions, time, policy, projections, forces, free
         As above, float64.
     episodes : array (N,) of int64
         Codes 0 .. n_episodes - 1, fit to be passed as `groups=`.
@@ -59,6 +63,8 @@ class Demonstrations:
     time: Array | None
     policy: Array | None
     projections: Array | None
+    forces: Array | None
+    free: Array | None
     state_names: tuple[str, ...]
     action_names: tuple[str, ...]
     episode_labels: tuple[str, ...]
@@ -76,6 +82,8 @@ class Demonstrations:
         action_names: Sequence[str] | None = None,
         episode_labels: Sequence[str] | None = None,
         notes: Sequence[str] = (),
+        forces: ArrayLike | None = None,
+        free: ArrayLike | None = None,
     ) -> None:
         X = _samples("states", states)
         U = _samples("actions", actions)
@@ -90,6 +98,8 @@ class Demonstrations:
             "projections": None
             if projections is None
             else _shaped("projections", _numbers("projections", projections), (N, d, d)),
+            "forces": None if forces is None else _forces(forces, N),
+            "free": None if free is None else _flags(free, N),
             "state_names": _names("state_names", state_names, "x", n),
             "action_names": _names("action_names", action_names, "u", d),
             "episode_labels": labels,
@@ -127,6 +137,8 @@ class Demonstrations:
             time=None if self.time is None else self.time[index],
             policy=None if self.policy is None else self.policy[index],
             projections=None if self.projections is None else self.projections[index],
+            forces=None if self.forces is None else self.forces[index],
+            free=None if self.free is None else self.free[index],
             episode_labels=tuple(self.episode_labels[code] for code in used),
         )
 
@@ -203,13 +215,13 @@ class Demonstrations:
     def concatenate(cls, several: Sequence["Demonstrations"]) -> "Demonstrations":
         """One after the other; the episodes stay distinct, and a label already taken gets a number.
 
-        Time, true policy and projections are kept where every one of them has them, otherwise left out
-        with a note. Names are those of the first.
+        Time, true policy, projections, forces and free flags are kept where every one of them has them,
+        otherwise left out with a note. Names are those of the first.
 
         Raises
         ------
         DataError
-            Nothing is given, or their states or actions differ in dimension.
+            Nothing is given, or their states, actions or forces differ in dimension.
         """
         if not several:
             raise DataError("there are no demonstrations to concatenate")
@@ -217,7 +229,9 @@ class Demonstrations:
         if len(several) == 1:
             return first
         for i, other in enumerate(several):
-            for what in ("states", "actions"):
+            for what in ("states", "actions", "forces"):
+                if getattr(other, what) is None or getattr(first, what) is None:
+                    continue
                 have, want = getattr(other, what).shape[1], getattr(first, what).shape[1]
                 if have != want:
                     raise DataError(
@@ -249,6 +263,8 @@ class Demonstrations:
             time=joined("time"),
             policy=joined("policy"),
             projections=joined("projections"),
+            forces=joined("forces"),
+            free=joined("free"),
             state_names=first.state_names,
             action_names=first.action_names,
             episode_labels=tuple(labels),
@@ -256,7 +272,8 @@ class Demonstrations:
         )
 
     def __repr__(self) -> str:
-        extras = [what for what in ("time", "policy", "projections") if getattr(self, what) is not None]
+        optional = ("time", "policy", "projections", "forces", "free")
+        extras = [what for what in optional if getattr(self, what) is not None]
         parts = [
             f"{_count(len(self), 'sample')} in {_count(self.n_episodes, 'episode')}",
             f"states {_shortened(self.state_names)}",
@@ -302,6 +319,23 @@ def _shaped(what: str, array: Array, shape: tuple[int, ...]) -> Array:
             + (f" and {shape[1]} actions" if len(shape) > 1 else "")
         )
     return array
+
+
+def _forces(values: ArrayLike, count: int) -> Array:
+    array = _samples("forces", values)
+    if len(array) != count:
+        raise DataError(f"there are {len(array)} forces and {count} states: give one force for each state")
+    return array
+
+
+def _flags(values: ArrayLike, count: int) -> Array:
+    flags = _shaped("free", _numbers("free", values), (count,))
+    odd = np.flatnonzero((flags != 0) & (flags != 1))
+    if len(odd):
+        raise DataError(
+            f"free must be 1 (nothing constrains the motion) or 0, got {flags[odd[0]]:g} in row {odd[0]}"
+        )
+    return flags
 
 
 def _names(what: str, names: Sequence[str] | None, letter: str, count: int) -> tuple[str, ...]:

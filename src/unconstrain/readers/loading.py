@@ -40,6 +40,8 @@ def load(
     time: Key | None = None,
     episode: Key | None = None,
     *,
+    force: Keys | None = None,
+    free: Key | None = None,
     time_unit: str | None = None,
     window: float = 0.2,
     gap: float | None = None,
@@ -66,6 +68,10 @@ def load(
     episode : column
         Of any type; its values tell episodes apart and may alternate. Without it every file is an episode;
         with it and several files, every value in every file is.
+    force : column, or list of columns, optional
+        Measured contact forces, of which `constraints.from_recording` makes projections.
+    free : column, optional
+        1 where nothing constrained the motion, else 0.
     time_unit : {"s", "ms", "us", "ns"}, optional
         To insist on a unit.
     window : float
@@ -103,8 +109,10 @@ def load(
             raise DataError(f"{name} must be a positive number, got {value!r}")
     if time_unit is not None and time_unit not in PER_SECOND:
         raise DataError(f"time_unit must be one of {', '.join(PER_SECOND)}, got {time_unit!r}")
-    if state is None and not (action is time is episode is None):
-        raise DataError("action, time and episode columns were given but no state columns; give state= too")
+    if state is None and not (action is time is episode is force is free is None):
+        raise DataError(
+            "action, time, episode, force and free columns were given but no state columns; give state= too"
+        )
 
     files = recordings(paths)
     several = []
@@ -117,7 +125,9 @@ def load(
             raise DataError(f"{shown} cannot be read: {error.strerror or error}") from error
         differentiated = table is not None and action is None
         if table is not None:
-            demos = assigned(table, label, len(files) > 1, state, action, time, episode, time_unit)
+            demos = assigned(
+                table, label, len(files) > 1, state, action, time, episode, time_unit, force, free
+            )
         assert demos is not None
         if table is not None or gap is not None or max_speed is not None:
             demos = _split(demos, shown, differentiated, window, gap, max_speed, min_duration)
@@ -129,6 +139,22 @@ def load(
     _check_same_names(several, files)
     demos = Demonstrations.concatenate(several)
     return demos if min_speed is None else demos.moving(min_speed)
+
+
+def derived(
+    demos: Demonstrations,
+    shown: str,
+    *,
+    window: float,
+    gap: float | None = None,
+    max_speed: float | None = None,
+    min_duration: float | None = None,
+) -> Demonstrations:
+    """The demonstrations, split where the recording is broken, with the derivative of the states as actions.
+
+    All as `load` does it, which see; `shown` is what the recording is called in errors and notes.
+    """
+    return _differentiated(_split(demos, shown, True, window, gap, max_speed, min_duration), window)
 
 
 def _is_number(value: object) -> bool:

@@ -22,6 +22,8 @@ def assigned(
     time: Key | None,
     episode: Key | None,
     time_unit: str | None,
+    force: Keys | None = None,
+    free: Key | None = None,
 ) -> Demonstrations:
     """The table's columns in their roles. Where no action column is given, the actions are still missing."""
     if state is None:
@@ -40,6 +42,13 @@ def assigned(
             raise DataError(
                 f"{table.path}: there are {len(states)} states but {len(actions)} actions; "
                 "there must be one action per state"
+            )
+    forces = None if force is None else table.matrix("force", _positions(table, "force", force))
+    flags = None if free is None else table.matrix("free", [_position(table, "free", free)])[:, 0]
+    for name, values in (("forces", forces), ("free flags", flags)):
+        if values is not None and len(values) != len(states):
+            raise DataError(
+                f"{table.path}: there are {len(states)} states but {len(values)} {name}; give one per state"
             )
     codes = np.zeros(len(states), dtype=np.int64)
     labels: tuple[str, ...] = (label,)
@@ -65,6 +74,8 @@ def assigned(
         action_names=action_names,
         episode_labels=labels,
         notes=notes,
+        forces=forces,
+        free=flags,
     )
 
 

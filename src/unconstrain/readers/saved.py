@@ -16,7 +16,7 @@ from unconstrain.readers import npz, parquet
 
 FORMAT = 1
 KEY = "unconstrain"  # of the JSON text, in NPZ as an array, in Parquet as schema metadata
-ARRAYS = ("states", "actions", "episodes", "time", "policy", "projections")
+ARRAYS = ("states", "actions", "episodes", "time", "policy", "projections", "forces", "free")
 NAMES = ("state_names", "action_names", "episode_labels", "notes")
 
 
@@ -24,8 +24,8 @@ def save(demos: Demonstrations, path: str | os.PathLike[str]) -> None:
     """Write demonstrations to an NPZ or Parquet file, by suffix; `load(path)` gives them back exactly.
 
     NPZ holds the arrays under the names of the fields. Parquet holds one column per state, action and
-    true-policy dimension, the projections as lists of d², row by row, and in its schema metadata, as JSON,
-    which columns play which role.
+    true-policy dimension, forces and free flags likewise, the projections as lists of d², row by row, and in its
+    schema metadata, as JSON, which columns play which role.
 
     Raises
     ------
@@ -84,6 +84,21 @@ def read_saved(path: Path, shown: str) -> Demonstrations | None:
         raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations{reason}") from error
 
 
+def roles(schema: pa.Schema) -> dict[str, Any] | None:
+    """Which columns of a Parquet file that `save` wrote play which role, or None where it is not of its making.
+
+    "states" and "actions" are lists of names, "episodes" and "time" (where there is one) names.
+    """
+    try:
+        about = json.loads((schema.metadata or {})[KEY.encode()])
+        found: dict[str, Any] = about["roles"]
+        return (
+            found if about["format"] <= FORMAT and {"states", "actions", "episodes"} <= set(found) else None
+        )
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
 def _table(demos: Demonstrations, about: dict[str, Any]) -> pa.Table:
     columns: dict[str, pa.Array] = {}
 
@@ -109,6 +124,13 @@ def _table(demos: Demonstrations, about: dict[str, Any]) -> pa.Table:
                 add(name, pa.array(np.ascontiguousarray(column)))
                 for name, column in zip(names, matrix.T, strict=True)
             ]
+    if demos.forces is not None:
+        roles["forces"] = [
+            add(f"force.{i + 1}", pa.array(np.ascontiguousarray(column)))
+            for i, column in enumerate(demos.forces.T)
+        ]
+    if demos.free is not None:
+        roles["free"] = add("free", pa.array(demos.free))
     if demos.projections is not None:
         flat = pa.array(np.ascontiguousarray(demos.projections).reshape(-1))
         lists = pa.FixedSizeListArray.from_arrays(flat, demos.actions.shape[1] ** 2)
@@ -120,8 +142,8 @@ def _columns(table: pa.Table, roles: dict[str, Any]) -> dict[str, np.ndarray]:
     def flat(name: str) -> np.ndarray:
         return table.column(name).to_numpy()
 
-    arrays: dict[str, np.ndarray] = {n: flat(roles[n]) for n in ("episodes", "time") if n in roles}
-    for role in ("states", "actions", "policy"):
+    arrays: dict[str, np.ndarray] = {n: flat(roles[n]) for n in ("episodes", "time", "free") if n in roles}
+    for role in ("states", "actions", "policy", "forces"):
         if role in roles:
             arrays[role] = np.column_stack([flat(name) for name in roles[role]])
     if "projections" in roles:

@@ -1,8 +1,4 @@
-"""From constraints to the projections that realise them.
-
-A constraint says which directions of action are impossible: the rows of ``A`` satisfy ``A u = 0``. What is
-left of a policy under it is ``u = N π(x)``, with ``N = I - A⁺A`` the projection onto the nullspace of ``A``.
-"""
+"""From constraint rows to the projection onto their nullspace."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -1,0 +1,36 @@
+"""From what is known of constraints to the projections that realise them.
+
+A constraint says which directions of action are impossible: the rows of ``A`` satisfy ``A u = 0``. What is
+left of a policy under it is ``u = N π(x)``, with ``N = I - A⁺A`` the projection onto the nullspace of ``A``.
+
+`projection` takes the rows themselves; `from_normals`, `from_jacobian`, `from_forces` and `from_flags` start from what
+is measured. Where a sample's constraint is not known its projection is all NaN, and ``policy.fit(X, U,
+projections=N)`` learns from that sample what can be learnt without (``risk="auto"``). `learnt_constraints` finds
+constraints in the actions.
+"""
+
+from unconstrain.constraints.forces import contact, from_forces
+from unconstrain.constraints.known import first_known, from_flags, from_jacobian, from_normals
+from unconstrain.constraints.nullspace import (
+    NEGLIGIBLE_ROW,
+    RANK_TOLERANCE,
+    combine,
+    projection,
+    unconstrained,
+)
+from unconstrain.constraints.recorded import from_recording
+
+__all__ = [
+    "NEGLIGIBLE_ROW",
+    "RANK_TOLERANCE",
+    "combine",
+    "contact",
+    "first_known",
+    "from_flags",
+    "from_forces",
+    "from_jacobian",
+    "from_normals",
+    "from_recording",
+    "projection",
+    "unconstrained",
+]

@@ -1,0 +1,128 @@
+"""Projections from what is known sample by sample: contact normals, Jacobian rows, a flag that says "free".
+
+A sample of which nothing is known has a projection that is all NaN.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from unconstrain.constraints.nullspace import projection, unconstrained
+from unconstrain.errors import DataError
+
+Array = NDArray[np.float64]
+
+
+def from_normals(normals: ArrayLike, jacobian: ArrayLike | None = None) -> Array:
+    """Projections (N, d, d) from the directions in which contacts block the motion, ``n·v = 0``.
+
+    Parameters
+    ----------
+    normals : array (N, m) or (N, k, m)
+        One or several contact normals a sample, of any length and sign. A zero normal is no contact; a sample with
+        NaN in its normals is one of which nothing is known.
+    jacobian : array (N, m, d), optional
+        From actions to the velocities that the normals speak of, ``v = J u``: a contact at a robot's hand, with joint
+        velocities as actions, has the constraint row ``nᵀJ``. By default v is the action itself.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, or an entry is infinite.
+    """
+    n = _numbers("normals", normals)
+    if n.ndim == 2:
+        n = n[:, None, :]
+    if n.ndim != 3:
+        raise DataError(
+            f"normals must be (samples, m) or (samples, contacts, m), got shape {np.shape(normals)}"
+        )
+    unknown = np.asarray(np.isnan(n).any(axis=(1, 2)))
+    rows = np.where(unknown[:, None, None], 0.0, n)
+    if jacobian is not None:
+        rows = rows @ _jacobians(jacobian, len(n), n.shape[2])
+    N = projection(rows)
+    N[unknown] = np.nan
+    return N
+
+
+def from_jacobian(jacobian: ArrayLike, rows: Sequence[int] | None = None) -> Array:
+    """Projections (N, d, d) under which the chosen rows of a Jacobian (N, m, d) do not move: ``A = J[rows]``.
+
+    rows: of the m task coordinates, those that are held fixed, counted from 0; all of them by default.
+
+    Raises `DataError` if the Jacobian is not (N, m, d) and finite, or has no such row.
+    """
+    J = _numbers("the Jacobian", jacobian)
+    if J.ndim != 3:
+        raise DataError(f"the Jacobian must be (samples, task coordinates, actions), got shape {J.shape}")
+    chosen = list(range(J.shape[1])) if rows is None else list(rows)
+    outside = [row for row in chosen if not -J.shape[1] <= row < J.shape[1]]
+    if outside:
+        raise DataError(f"the Jacobian has {J.shape[1]} rows, counted from 0: there is no row {outside[0]}")
+    return projection(J[:, chosen])
+
+
+def from_flags(free: ArrayLike, d: int) -> Array:
+    """Projections (N, d, d) from a flag a sample (N,): the identity where it says "free", else not known (NaN).
+
+    free: booleans, or numbers of which 0 says "not free" and anything else "free". d: number of actions.
+
+    Raises `DataError` if it is not one number a sample.
+    """
+    flags = _numbers("the free flags", free)
+    if flags.ndim != 1:
+        raise DataError(f"the free flags must be one a sample, (samples,), got shape {flags.shape}")
+    if np.isnan(flags).any():
+        raise DataError(
+            f"the free flag of row {np.argmax(np.isnan(flags))} is NaN: give 0 where nothing is known"
+        )
+    N = unconstrained(d, len(flags))
+    N[flags == 0] = np.nan
+    return N
+
+
+def first_known(*projections: ArrayLike) -> Array:
+    """For each sample the first of several projections, each (N, d, d), that is known; NaN where none is.
+
+    Raises `DataError` if none are given or their shapes differ.
+    """
+    if not projections:
+        raise DataError("there are no projections to choose from: give at least one array (N, d, d)")
+    first, *others = (np.asarray(N, dtype=np.float64) for N in projections)
+    chosen = first.copy()
+    for other in others:
+        if other.shape != chosen.shape:
+            raise DataError(
+                f"projections of shapes {chosen.shape} and {other.shape} are not of the same samples"
+            )
+        unknown = np.isnan(chosen).any(axis=(1, 2))
+        chosen[unknown] = other[unknown]
+    return chosen
+
+
+def _jacobians(jacobian: ArrayLike, samples: int, m: int) -> Array:
+    J = _numbers("the Jacobian", jacobian)
+    if J.ndim != 3 or J.shape[:2] != (samples, m):
+        raise DataError(
+            f"the Jacobian must be ({samples}, {m}, actions), one a sample and a row for each of the {m} components, "
+            f"got shape {J.shape}"
+        )
+    if np.isnan(J).any():
+        raise DataError(
+            f"the Jacobian of row {np.argwhere(np.isnan(J))[0][0]} has NaN: leave that sample out"
+        )
+    return J
+
+
+def _numbers(what: str, values: ArrayLike) -> Array:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"{what} must be an array of numbers ({error})") from error
+    if np.isinf(array).any():
+        raise DataError(
+            f"{what} have an infinite value at index {tuple(np.argwhere(np.isinf(array))[0].tolist())}"
+        )
+    return array

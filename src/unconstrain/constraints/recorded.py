@@ -1,0 +1,61 @@
+"""What a recording itself says of its constraints: forces, and flags that say "free"."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from unconstrain.constraints.forces import from_forces
+from unconstrain.constraints.known import first_known, from_flags
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
+
+
+def from_recording(
+    demonstrations: Demonstrations,
+    *,
+    force_threshold: float | None = None,
+    release: float | None = None,
+    window: int = 5,
+    margin: int = 0,
+    jacobian: ArrayLike | None = None,
+) -> NDArray[np.float64]:
+    """Projections (N, d, d) of a recording that holds forces, free flags, or both; NaN where nothing is known.
+
+    A sample flagged "free" has the identity. One that is not flagged, though there are flags, has what its force says,
+    unless that is "free" too: then the two disagree, and nothing is known.
+
+    demonstrations: with `forces` (N, m), `free` (N,), or both, as `load(..., force=[...], free=...)` reads them.
+    force_threshold: needed where there are forces, in their unit; it and all others as for `from_forces`.
+
+    Raises `DataError` where there are neither forces nor flags, or forces without a threshold.
+    """
+    forces, free = demonstrations.forces, demonstrations.free
+    if forces is None and free is None:
+        raise DataError(
+            "these demonstrations have neither forces nor flags that say free: name the columns when loading, "
+            "load(..., force=[...]) or load(..., free=...)"
+        )
+    d = demonstrations.actions.shape[1]
+    if forces is None:
+        assert free is not None
+        return from_flags(free, d)
+    if force_threshold is None:
+        raise DataError("give force_threshold, above which a force is a contact, in the unit of the forces")
+    if jacobian is None and forces.shape[1] != d:
+        raise DataError(
+            f"forces have {forces.shape[1]} components and actions {d} dimensions: give one force column for each "
+            "action column, or the Jacobian that leads from actions to the point touched"
+        )
+    felt = from_forces(
+        forces,
+        force_threshold,
+        actions=demonstrations.actions,
+        jacobian=jacobian,
+        release=release,
+        window=window,
+        margin=margin,
+        episodes=demonstrations.episodes,
+    )
+    if free is None:
+        return felt
+    felt[(felt == np.eye(d)).all(axis=(1, 2))] = np.nan
+    return first_known(from_flags(free, d), felt)

@@ -41,7 +41,7 @@ def field(
     label: str | None = None,
     longest: float | None = None,
 ) -> None:
-    """Draw a policy over two states as arrows on a grid.
+    """Draw a policy over two states as arrows on a grid, each beginning at its state.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def field(
     color, label
         Of the arrows, and in the legend.
     longest : float, optional
-        Length of action drawn one grid spacing long; by default that of the longest arrow. Give the same
+        Length of action drawn one and a half grid spacings long; by default that of the longest arrow. Give the same
         to several fields to compare them.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
@@ -101,14 +101,16 @@ def agreement(ax: Axes, actions: ArrayLike, predictions: ArrayLike) -> None:
     length, along = length[length > 0], along[length > 0]
     step = max(1, len(length) // SHOWN_POINTS)
     top = float(length.max(initial=0.0)) * 1.05 or 1.0
-    ax.plot([0, top], [0, top], color=TRUE, lw=1, ls="--", label="agreement", zorder=3)
-    ax.plot(length[::step], along[::step], ".", color=LEARNT, ms=3, alpha=0.4, mec="none", label="samples")
+    ax.plot([0, top], [0, top], color=TRUE, lw=1, ls="--", label="agreement", zorder=1)
+    ax.plot(length[::step], along[::step], ".", color=LEARNT, ms=5, alpha=0.35, mec="none", label="samples")
     ax.set_xlim(0, top)
     ax.set(xlabel="recorded speed  r = ‖u‖", ylabel="learnt, same direction  û·π(x)")
     _titled(ax, "Recorded and learnt actions")
 
 
-def learned_field(demonstrations: Demonstrations, policy: Any, names: tuple[str, ...] | None = None) -> Figure:
+def learned_field(
+    demonstrations: Demonstrations, policy: Any, names: tuple[str, ...] | None = None
+) -> Figure:
     """The recorded movement and the policy learnt from it.
 
     Over two states: the movement dotted, the policy as arrows on a grid wherever there are data. Over more:
@@ -151,7 +153,9 @@ def learned_field(demonstrations: Demonstrations, policy: Any, names: tuple[str,
             field(ax, policy, low, high, n=17, near=X, label="learnt policy")
         elif arrows:
             picked, cell = _spread(X[:, [i, j]])
-            _arrows(ax, X[picked][:, [i, j]], U[picked][:, [i, j]], cell, DIRECT, "recorded action", None)
+            _arrows(
+                ax, X[picked][:, [i, j]], U[picked][:, [i, j]], cell, DIRECT, "recorded action", None, 0.009
+            )
             longest = float(np.linalg.norm(U[picked][:, [i, j]], axis=1).max())
             _arrows(ax, X[picked][:, [i, j]], P[picked][:, [i, j]], cell, LEARNT, "learnt policy", longest)
         _labelled(ax, (names[i], names[j]))
@@ -168,6 +172,15 @@ def learned_field(demonstrations: Demonstrations, policy: Any, names: tuple[str,
     return figure
 
 
+def check_suffix(path: str | os.PathLike[str] | None) -> None:
+    """Raise `UnconstrainError` for a figure's name that does not end in one of `SUFFIXES`; None is no figure."""
+    if path is not None and Path(path).suffix.lower() not in SUFFIXES:
+        raise UnconstrainError(
+            f"A figure cannot be written to {Path(path).name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
+            f"{SUFFIXES[-1]}."
+        )
+
+
 def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     """Write a figure as PNG, SVG or PDF, whichever the name ends in; whole or not at all.
 
@@ -176,13 +189,9 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     UnconstrainError
         If the name ends in anything else, or cannot be written to.
     """
+    check_suffix(path)
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise UnconstrainError(
-            f"A figure cannot be written to {path.name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
-            f"{SUFFIXES[-1]}."
-        )
     # Without the date the same figure is the same file.
     metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
     with atomic.replacing(path) as temporary:
@@ -196,13 +205,20 @@ def _actions(policy: Any, X: Array) -> Array:
 
 
 def _arrows(
-    ax: Axes, points: Array, vectors: Array, spacing: float, color: str, label: str | None, longest: float | None
+    ax: Axes,
+    points: Array,
+    vectors: Array,
+    spacing: float,
+    color: str,
+    label: str | None,
+    longest: float | None,
+    width: float = 0.0042,
 ) -> None:
     lengths = np.linalg.norm(vectors, axis=1)
-    scale = (longest or float(lengths.max(initial=0.0)) or 1.0) / spacing
+    scale = (longest or float(lengths.max(initial=0.0)) or 1.0) / (1.5 * spacing)
     ax.quiver(
         *points.T, *vectors.T, angles="xy", scale_units="xy", scale=scale, color=color, label=label,
-        width=0.0042, headwidth=3.6, headlength=4.2, headaxislength=3.8, zorder=2,
+        width=width, headwidth=3.2, headlength=3.6, headaxislength=3.3, minlength=0.5, zorder=2,
     )  # fmt: skip
 
 

@@ -3,13 +3,15 @@
 One input "x" (batch, n) and one output "u" (batch, d), both float64, with any number of states in a batch. The graph
 is built from a compiled policy's arrays:
 
-| kind   | graph                                                            |
-| ------ | ---------------------------------------------------------------- |
-| linear | x Wᵀ + t                                                         |
-| rbf    | Softmax(-‖x - c_i‖² / 2σ²) Wᵀ                                    |
-| local  | Σ_m Softmax(-‖x - c_m‖² / 2σ²)_m (B_m x + t_m)                   |
+| kind   | graph                                    |
+| ------ | ---------------------------------------- |
+| linear | x Wᵀ + t                                 |
+| rbf    | Softmax(e) Wᵀ                            |
+| local  | Σ_m Softmax(e)_m (B_m x + t_m)           |
 
-`Softmax` takes the largest exponent out first, so the model is finite far from all centres as well.
+with the exponents `e_i = (c_i - m)ᵀ(x - m) / σ² - ‖c_i - m‖² / 2σ²`, m the centres' mean: what is left of
+`-‖x - c_i‖² / 2σ²` without the part that all centres share, which `Softmax` would take out anyway. That is one
+product, and nothing overflows far from all centres.
 """
 
 from importlib.metadata import version
@@ -62,30 +64,30 @@ def _model(step: CompiledPolicy):
         nodes.append(helper.make_node(operator, list(inputs), [output], name=output, **attributes))
         return output
 
+    def affine(inputs: str, slopes, offsets, output: str) -> str:
+        return node(
+            "Gemm", inputs, constant(f"{output}_slopes", slopes), constant(f"{output}_offsets", offsets), output=output,
+            transB=1,
+        )  # fmt: skip
+
     def blend() -> str:
-        states = node("Unsqueeze", "x", constant("centre_axis", np.array([1])), output="states")
-        away = node("Sub", states, constant("centers", a["centers"][None]), output="away")
-        squared = node("ReduceSumSquare", away, output="squared", axes=[2], keepdims=0)
-        exponents = node(
-            "Mul", squared, constant("scale", np.array(-0.5 / a["width"] ** 2)), output="exponents"
-        )
+        mean = a["centers"].mean(axis=0)
+        centers = (a["centers"] - mean) / a["width"]
+        away = node("Sub", "x", constant("mean", mean), output="away")
+        exponents = affine(away, centers / a["width"], -0.5 * np.sum(centers**2, axis=1), "exponents")
         return node("Softmax", exponents, output="activations", axis=1)
 
     if isinstance(step, Linear):
-        turned = node("MatMul", "x", constant("coef", a["coef"].T), output="turned")
-        node("Add", turned, constant("intercept", a["intercept"]), output="u")
+        affine("x", a["coef"], a["intercept"], "u")
     elif isinstance(step, RadialBasis):
         node("MatMul", blend(), constant("weights", a["weights"].T), output="u")
     else:
-        # Blend the models, then apply what results: (batch, d, n + 1) times (batch, n + 1, 1).
-        models = np.concatenate([a["coef"], a["intercept"][:, :, None]], axis=2).reshape(-1, d * (n + 1))
-        flat = node("MatMul", blend(), constant("models", models), output="flat")
-        blended = node("Reshape", flat, constant("shape", np.array([-1, d, n + 1])), output="blended")
-        last = constant("last_axis", np.array([2]))
-        column = node("Unsqueeze", "x", last, output="column")
-        padding = constant("padding", np.array([0, 0, 0, 0, 1, 0]))
-        extended = node("Pad", column, padding, constant("one", np.array(1.0)), output="extended")
-        node("Squeeze", node("MatMul", blended, extended, output="applied"), last, output="u")
+        M = len(a["centers"])
+        flat = affine("x", a["coef"].reshape(M * d, n), a["intercept"].reshape(-1), "flat")
+        local = node("Reshape", flat, constant("models", np.array([-1, M, d])), output="local")
+        row = constant("row", np.array([1]))
+        blended = node("MatMul", node("Unsqueeze", blend(), row, output="rows"), local, output="blended")
+        node("Squeeze", blended, row, output="u")
 
     graph = helper.make_graph(
         nodes,

@@ -25,6 +25,8 @@ TRUE, LEARNT, DIRECT, RECORDED = "#000000", "#0072B2", "#D55E00", "#777777"
 SUFFIXES = (".png", ".svg", ".pdf")
 
 SHOWN_COORDINATES = 3
+LONGEST_ARROW = 1.5
+"""In spacings of the arrows: shorter, and slow regions show no direction; longer, and arrows run together."""
 SHOWN_POINTS = 4000
 """A scatter of more points than this is thinned: it would only grow the file."""
 
@@ -58,8 +60,8 @@ def field(
     color, label
         Of the arrows, and in the legend.
     longest : float, optional
-        Length of action drawn one and a half grid spacings long; by default that of the longest arrow. Give the same
-        to several fields to compare them.
+        Length of action drawn one grid spacing long; give the same to several fields to compare them. By
+        default the longest arrow spans one and a half spacings.
     """
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     x, y = (np.linspace(a, b, n) for a, b in zip(low, high, strict=True))
@@ -68,7 +70,8 @@ def field(
     if near is not None:
         distance, _ = cKDTree(np.asarray(near) / spacing).query(points / spacing)
         points = points[distance <= 1.0]
-    _arrows(ax, points, _actions(policy, points), float(spacing.min()), color, label, longest)
+    reach = float(spacing.min()) * (LONGEST_ARROW if longest is None else 1.0)
+    _arrows(ax, points, _actions(policy, points), reach, color, label, longest)
     _labelled(ax, ("x1", "x2"))
 
 
@@ -153,11 +156,12 @@ def learned_field(
             field(ax, policy, low, high, n=17, near=X, label="learnt policy")
         elif arrows:
             picked, cell = _spread(X[:, [i, j]])
+            reach = LONGEST_ARROW * cell
             _arrows(
-                ax, X[picked][:, [i, j]], U[picked][:, [i, j]], cell, DIRECT, "recorded action", None, 0.009
+                ax, X[picked][:, [i, j]], U[picked][:, [i, j]], reach, DIRECT, "recorded action", None, 0.009
             )
             longest = float(np.linalg.norm(U[picked][:, [i, j]], axis=1).max())
-            _arrows(ax, X[picked][:, [i, j]], P[picked][:, [i, j]], cell, LEARNT, "learnt policy", longest)
+            _arrows(ax, X[picked][:, [i, j]], P[picked][:, [i, j]], reach, LEARNT, "learnt policy", longest)
         _labelled(ax, (names[i], names[j]))
         _titled(ax, "Recorded movement, learnt policy" if len(pairs) == 1 else f"{names[j]} over {names[i]}")
     if not pairs:
@@ -208,14 +212,14 @@ def _arrows(
     ax: Axes,
     points: Array,
     vectors: Array,
-    spacing: float,
+    reach: float,
     color: str,
     label: str | None,
     longest: float | None,
     width: float = 0.0042,
 ) -> None:
     lengths = np.linalg.norm(vectors, axis=1)
-    scale = (longest or float(lengths.max(initial=0.0)) or 1.0) / (1.5 * spacing)
+    scale = (longest or float(lengths.max(initial=0.0)) or 1.0) / reach
     ax.quiver(
         *points.T, *vectors.T, angles="xy", scale_units="xy", scale=scale, color=color, label=label,
         width=width, headwidth=3.2, headlength=3.6, headaxislength=3.3, minlength=0.5, zorder=2,

@@ -86,11 +86,11 @@ class Planner:
         X, q = np.repeat(self.X, d, axis=0), vectors.swapaxes(1, 2).reshape(C * d, d)
         best = int(np.argmax(self.gains(X, q, criterion)))
         before = self.expected_error()
-        self._make(X[best : best + 1], q[best : best + 1])
+        self.record(X[best : best + 1], q[best : best + 1])
         gain = 1.0 - self.expected_error() / before if before > 0 else 0.0
         return Recording(X[best], q[best], float(np.sqrt(max(values.reshape(-1)[best], 0.0))), gain)
 
-    def _make(self, x: np.ndarray, q: np.ndarray) -> None:
+    def record(self, x: np.ndarray, q: np.ndarray) -> None:
         """Take the recording at x (1, n) along q (1, d) into the posterior."""
         v, weights = self._seen(x, q)[0], self._weights(x)[0]
         noise = (

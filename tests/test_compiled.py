@@ -155,6 +155,35 @@ def test_the_file_is_what_the_documentation_says(name, tmp_path):
         assert all(archive[each].dtype == np.float64 for each in KINDS[kind].layout)
 
 
+def by_the_documentation(kind, a, x):
+    """docs/compiled.md, word for word."""
+    if kind == "linear":
+        return a["coef"] @ x + a["intercept"]
+    if kind == "additive":
+        pieces = [np.count_nonzero(breaks <= xj) for breaks, xj in zip(a["breaks"], x, strict=True)]
+        order = a["polynomials"].shape[2]
+        return sum(
+            a["polynomials"][j, k, q] * (x[j] - a["origins"][j, k]) ** q
+            for j, k in enumerate(pieces)
+            for q in range(order)
+        )
+    K = np.exp(-np.sum((x - a["centers"]) ** 2, axis=1) / (2 * a["width"] ** 2))
+    b = K / K.sum()
+    if kind == "rbf":
+        return a["weights"] @ b
+    if kind == "local":
+        return sum(b[m] * (a["coef"][m] @ x + a["intercept"][m]) for m in range(len(b)))
+    w, c = a["weights"], a["centers"]
+    return ((w @ b) * (b @ c) - (w * b) @ c) / a["width"] ** 2
+
+
+@each
+def test_the_arrays_mean_what_the_documentation_says(name):
+    for x in X[:20]:
+        expected = by_the_documentation(STEPS[name].kind, STEPS[name].arrays, x)
+        assert_agrees(STEPS[name], x, expected)
+
+
 @each
 def test_does_not_change(name):
     step = STEPS[name]

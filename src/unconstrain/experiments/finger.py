@@ -79,8 +79,8 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
         table="\n".join(lines) + f"\n\nLinear policy, {seen.n_episodes} movements with an obstacle each; "
         f"errors on {unseen.n_episodes} others.\n",
         figures={
-            png: "Fig. 1 anew: the free movement; the movement along an obstacle; both fields over two joints (recorded "
-            "actions, and the policy they come from); the policy learnt from several obstacles over the true one."
+            png: "Fig. 1 anew: the free movement; the movement along an obstacle; both fields over two joints, "
+            "recorded actions and the policy they come from; that learnt from several obstacles over the true one."
         },
         choices=CHOICES,
         findings=(

@@ -1,0 +1,5 @@
+"""`python -m unconstrain`: the command line."""
+
+from unconstrain.cli import main
+
+main()

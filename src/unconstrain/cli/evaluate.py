@@ -1,0 +1,87 @@
+"""`unconstrain evaluate`: a policy against recordings it has not seen."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from unconstrain import risk, selection
+from unconstrain.cli import recordings
+from unconstrain.cli.fit import describe
+from unconstrain.cli.recordings import (
+    Action,
+    Episode,
+    Files,
+    Gap,
+    MaxSpeed,
+    MinDuration,
+    MinSpeed,
+    State,
+    Time,
+    Window,
+)
+from unconstrain.cli.recordings import TimeUnit as Unit
+from unconstrain.errors import DataError
+from unconstrain.policies import load_policy
+
+
+def evaluate(
+    policy: Annotated[Path, typer.Argument(help="A policy saved by `unconstrain fit`.", metavar="POLICY")],
+    files: Files,
+    state: State = None,
+    action: Action = None,
+    time: Time = None,
+    episode: Episode = None,
+    time_unit: Unit = None,
+    window: Window = None,
+    gap: Gap = None,
+    max_speed: MaxSpeed = None,
+    min_speed: MinSpeed = None,
+    min_duration: MinDuration = None,
+) -> None:
+    """Hold a saved policy against other recordings.
+
+    They are read as those it was learnt from, unless an option says otherwise.
+    """
+    learnt = load_policy(policy)
+    how = getattr(learnt, "recording_", {}) | recordings.asked(
+        state,
+        action,
+        time,
+        episode,
+        time_unit=time_unit,
+        window=window,
+        gap=gap,
+        max_speed=max_speed,
+        min_speed=min_speed,
+        min_duration=min_duration,
+    )
+    console = Console()
+    demos = recordings.read(files, how)
+    describe(console, demos)
+    if demos.states.shape[1] != learnt.n_features_in_ or demos.actions.shape[1] != learnt.n_actions_:
+        raise DataError(
+            f"{policy} maps {learnt.n_features_in_} states to {learnt.n_actions_} actions, but the recordings have "
+            f"{demos.states.shape[1]} and {demos.actions.shape[1]}: choose the columns it was learnt from"
+        )
+    P = learnt.predict(demos.states).reshape(demos.actions.shape)
+    table = Table("episode", "samples", "inconsistency", "share of observed motion explained")
+    rows = [(demos.episode_labels[code], demos.episodes == code) for code in range(demos.n_episodes)]
+    if len(rows) > 1:
+        for label, mask in rows[:20]:
+            _add(table, label, demos.actions[mask], P[mask])
+        if len(rows) > 20:
+            table.add_row(f"... {len(rows) - 20} more", "", "", "")
+    _add(table, "all", demos.actions, P)
+    console.print(table)
+    if demos.policy is not None:
+        error = risk.normalized(risk.unconstrained_policy_error(demos.policy, P), demos.policy)
+        console.print(f"these recordings carry the true policy: nUPE {error:.4g}")
+
+
+def _add(table: Table, label: str, U: np.ndarray, P: np.ndarray) -> None:
+    share = f"{selection.explained(U, P):.2%}" if np.any(U) else "nothing moves"
+    table.add_row(label, str(len(U)), f"{risk.inconsistency(U, P):.4g}", share)

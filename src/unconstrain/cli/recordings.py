@@ -1,0 +1,101 @@
+"""Options that say which recordings, and which of their columns; shared by the commands that read files."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
+from unconstrain.readers import load
+
+Files = Annotated[list[str], typer.Argument(help="CSV, NPZ or Parquet recordings.", metavar="FILES...")]
+State = Annotated[
+    str | None,
+    typer.Option(
+        "--state", help="State columns: names or positions (from 0), separated by commas.", metavar="x,y,z"
+    ),
+]
+Action = Annotated[
+    str | None,
+    typer.Option(
+        "--action", help="Action columns; without them the states are differentiated.", metavar="u,v,w"
+    ),
+]
+Time = Annotated[
+    str | None, typer.Option("--time", help="Time column, in seconds or nanoseconds.", metavar="t")
+]
+Episode = Annotated[
+    str | None,
+    typer.Option("--episode", help="Column that tells episodes apart; else each file is one.", metavar="run"),
+]
+TimeUnit = Annotated[
+    str | None, typer.Option("--time-unit", help="s, ms, us or ns, where it is guessed wrongly.")
+]
+Window = Annotated[
+    float | None, typer.Option("--window", help="Seconds over which states are differentiated (0.2).")
+]
+Gap = Annotated[float | None, typer.Option("--gap", help="A step longer than this (s) splits an episode.")]
+MaxSpeed = Annotated[
+    float | None,
+    typer.Option("--max-speed", help="A step faster than this splits an episode: trackers jump."),
+]
+MinSpeed = Annotated[float | None, typer.Option("--min-speed", help="Leave out samples slower than this.")]
+MinDuration = Annotated[
+    float | None,
+    typer.Option("--min-duration", help="Drop fragments of split episodes shorter than this (s)."),
+]
+
+
+def columns(text: str | None) -> list[str | int] | None:
+    """`"x,y"` as names, `"1,2"` as positions. Raises `DataError` for an empty name."""
+    if text is None:
+        return None
+    names = [name.strip() for name in text.split(",")]
+    if not all(names):
+        raise DataError(f"{text!r} has an empty column name: separate names or positions by single commas")
+    return [int(name) if name.isdigit() else name for name in names]
+
+
+def one_column(text: str | None, option: str) -> str | int | None:
+    """A single column's name or position. Raises `DataError` for more than one."""
+    named = columns(text)
+    if named is None:
+        return None
+    if len(named) > 1:
+        raise DataError(f"{option} takes one column, got {len(named)}: {text}")
+    return named[0]
+
+
+def asked(
+    state: str | None,
+    action: str | None,
+    time: str | None,
+    episode: str | None,
+    **options: Any,
+) -> dict[str, Any]:
+    """The arguments of `load` that were given, in a form that can be kept with a policy."""
+    given = {
+        "state": columns(state),
+        "action": columns(action),
+        "time": one_column(time, "--time"),
+        "episode": one_column(episode, "--episode"),
+        **options,
+    }
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def read(files: list[str], how: dict[str, Any]) -> Demonstrations:
+    """The demonstrations in all the files."""
+    return load(files, **how)
+
+
+def check_writable(*paths: Path | None) -> None:
+    """Raise `DataError` before any work for an output whose folder is not there, or that is a folder."""
+    for path in paths:
+        if path is None:
+            continue
+        if path.is_dir():
+            raise DataError(f"cannot write {path}: it is a folder, so give the name of a file")
+        if not path.parent.is_dir():
+            raise DataError(f"cannot write {path}: there is no folder {path.parent}, so make it first")

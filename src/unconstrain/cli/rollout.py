@@ -1,0 +1,96 @@
+"""`unconstrain rollout`: where a policy leads, free or with something in the way."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import typer
+from matplotlib.figure import Figure
+from rich.console import Console
+
+from unconstrain import atomic, figures
+from unconstrain.cli import recordings
+from unconstrain.errors import DataError
+from unconstrain.policies import load_policy
+from unconstrain.rollout import Rollout
+from unconstrain.rollout import rollout as integrate
+
+
+def rollout(
+    policy: Annotated[Path, typer.Argument(help="A policy saved by `unconstrain fit`.", metavar="POLICY")],
+    start: Annotated[
+        str, typer.Option("--start", help='Where to start, one number a state: --start="0.1,-0.2".')
+    ],
+    steps: Annotated[int, typer.Option("--steps", help="How many steps.")] = 500,
+    dt: Annotated[float, typer.Option("--dt", help="Seconds a step.")] = 0.02,
+    block: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--block", help='A row of the constraint A, A u = 0: --block="1,0,0". May be given several times.'
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", help="Where the movement is written (CSV).")] = Path(
+        "rollout.csv"
+    ),
+    figure: Annotated[Path, typer.Option("--figure", help="Where it is drawn (PNG, SVG, PDF).")] = Path(
+        "rollout.png"
+    ),
+) -> None:
+    """Integrate a saved policy from a start, free or under a constraint."""
+    recordings.check_writable(out, figure)
+    figures.check_suffix(figure)
+    learnt = load_policy(policy)
+    rows = np.array([_numbers(row, "--block", learnt.n_actions_) for row in block]) if block else None
+    movement = integrate(learnt, _numbers(start, "--start", learnt.n_features_in_), steps, dt, rows)
+
+    names = _names(learnt)
+    columns = {"t": movement.time[:-1]}
+    columns |= {name: movement.states[:-1, i] for i, name in enumerate(names)}
+    columns |= {f"{name}_velocity": movement.actions[:, i] for i, name in enumerate(names)}
+    with atomic.replacing(out) as temporary:
+        pyarrow.csv.write_csv(pa.table(columns), temporary)
+    figures.save(_drawn(movement, names), figure)
+    console = Console()
+    end = ", ".join(f"{name} {value:.4g}" for name, value in zip(names, movement.states[-1], strict=True))
+    console.print(f"after {steps * dt:g} s: {end}", highlight=False)
+    console.print(f"movement: {out}\nfigure: {figure}")
+
+
+def _numbers(text: str, option: str, wanted: int) -> np.ndarray:
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise DataError(f"{option} must be numbers separated by commas, got {text!r}") from None
+    if len(numbers) != wanted:
+        raise DataError(f"{option} must have {wanted} numbers for this policy, got {len(numbers)}: {text}")
+    return numbers
+
+
+def _names(policy) -> list[str]:
+    """The states' names where the recordings had them, else x1, x2, ..."""
+    known = getattr(policy, "recording_", {}).get("state") or []
+    if len(known) == policy.n_features_in_ and all(isinstance(name, str) for name in known):
+        return list(known)
+    return [f"x{i + 1}" for i in range(policy.n_features_in_)]
+
+
+def _drawn(movement: Rollout, names: list[str]) -> Figure:
+    """The path over the first two states, and every state against time."""
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    if len(names) > 1:
+        figures.trajectories(
+            left, movement.states, np.zeros(len(movement.states)), color=figures.LEARNT, style="-"
+        )
+        left.set(xlabel=names[0], ylabel=names[1])
+        left.set_aspect("equal", adjustable="datalim")
+    else:
+        left.plot(movement.states[:-1, 0], movement.actions[:, 0], color=figures.LEARNT)
+        left.set(xlabel=names[0], ylabel=f"{names[0]} velocity")
+    for i, name in enumerate(names):
+        right.plot(movement.time, movement.states[:, i], label=name)
+    right.set(xlabel="t (s)")
+    right.legend(frameon=False, fontsize=8, ncols=2)
+    return figure

@@ -44,10 +44,10 @@ def evaluate(
 ) -> None:
     """Hold a saved policy against other recordings.
 
-    They are read as those it was learnt from, unless an option says otherwise.
+    They are read as those it was learnt from, unless an option says otherwise; with --state, all columns are named anew.
     """
     learnt = load_policy(policy)
-    how = getattr(learnt, "recording_", {}) | recordings.asked(
+    how = recordings.asked(
         state,
         action,
         time,
@@ -59,6 +59,7 @@ def evaluate(
         min_speed=min_speed,
         min_duration=min_duration,
     )
+    how = recordings.as_before(getattr(learnt, "recording_", {}), how)
     console = Console()
     demos = recordings.read(files, how)
     describe(console, demos)

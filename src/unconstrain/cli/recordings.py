@@ -85,6 +85,15 @@ def asked(
     return {name: value for name, value in given.items() if value is not None}
 
 
+def as_before(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
+    """How to read recordings that are like those of `before`, where `now` does not say otherwise.
+
+    Whoever names the states speaks of another layout: then no other column is taken over either.
+    """
+    columns = ("state", "action", "time", "episode") if "state" in now else ()
+    return {name: value for name, value in before.items() if name not in columns} | now
+
+
 def read(files: list[str], how: dict[str, Any]) -> Demonstrations:
     """The demonstrations in all the files."""
     return load(files, **how)

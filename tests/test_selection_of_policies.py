@@ -38,7 +38,7 @@ def test_on_the_limit_cycle_the_choice_is_among_the_best_though_no_truth_is_seen
 def test_joints_that_go_their_own_way_are_recognised():
     states, actions, Pi, episodes = joints()
     best = uc.select_policy("auto", states, actions, episodes)
-    assert best.name == "decoupled"
+    assert best.name in ("decoupled", "decoupled, fine")
     error = uc.risk.unconstrained_policy_error(Pi, best.policy.predict(states))
     assert uc.risk.normalized(error, Pi) < 0.01
 

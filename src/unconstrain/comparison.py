@@ -32,6 +32,7 @@ from unconstrain.validation import check_actions, check_groups, check_projection
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
 MOST_CENTERS = 50
+FINE_KNOTS = 31
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,8 @@ def candidates(n: int, d: int) -> dict[str, Policy]:
         named["splines"] = ParametricPolicy(splines, alpha="cv")
     if n == d:
         named["decoupled"] = ParametricPolicy(DecoupledFeatures(), alpha="cv")
+        if n * FINE_KNOTS <= MOST_PARAMETERS:  # for policies with a corner, such as ∇|x|^1.5
+            named["decoupled, fine"] = ParametricPolicy(DecoupledFeatures(FINE_KNOTS), alpha="cv")
         named["potential"] = ParametricPolicy(PotentialFeatures(NormalizedRBF(2 * MOST_CENTERS)), alpha="cv")
     return named
 

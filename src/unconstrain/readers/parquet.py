@@ -1,5 +1,6 @@
 """Parquet files: flat columns, and lists of one length, as LeRobot's `observation.state`."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,11 @@ def read(path: Path, shown: str) -> Table:
     DataError
         The file is damaged, not Parquet, or has no rows.
     """
-    table = whole(path, shown)
+    return columns_of(whole(path, shown), shown)
+
+
+def columns_of(table: pa.Table, shown: str, place: Callable[[int], str] = row) -> Table:
+    """An Arrow table's columns; `place` says where in the file `shown` a row is. Raises as `read` does."""
     if not table.num_rows:
         raise DataError(f"{shown} has no samples")
     columns: list[Column] = []
@@ -53,14 +58,14 @@ def read(path: Path, shown: str) -> Table:
         lengths = pc.list_value_length(values)
         uneven = pc.or_(values.is_null(), pc.fill_null(pc.not_equal(lengths, lengths[0]), True))
         if not lengths[0].is_valid or pc.any(uneven).as_py():
-            at = row(pc.index(uneven, True).as_py())
+            at = place(pc.index(uneven, True).as_py())
             unusable[name] = f"holds lists that are missing or differ in length, first at {at}"
         elif pa.types.is_nested(values.type.value_type):
             unusable[name] = f"holds {values.type} values"
         else:
             k, flat = lengths[0].as_py(), pc.list_flatten(values.combine_chunks())
             columns += [Column(f"{name}[{i}]", _every(flat, k, i), part_of=name) for i in range(k)]
-    return Table(shown, columns, unusable=unusable)
+    return Table(shown, columns, place, unusable)
 
 
 def _is_list(kind: Any) -> bool:

@@ -165,7 +165,8 @@ def test_chosen_alpha_has_the_least_held_out_risk_and_respects_episodes():
     policy = uc.ParametricPolicy(uc.NormalizedRBF(), alpha="cv").fit(
         demos.states, demos.actions, groups=demos.episodes
     )
-    assert policy.alpha_ == policy.alphas_[np.argmin(policy.held_out_risk_)]
+    as_good = policy.held_out_risk_ <= 1.01 * policy.held_out_risk_.min()
+    assert policy.alpha_ == policy.alphas_[as_good].max()
     fold = policy.folds_.assign(demos.episodes, len(demos.states))
     for episode in np.unique(demos.episodes):
         assert len(np.unique(fold[demos.episodes == episode])) == 1

@@ -12,6 +12,10 @@ from unconstrain.moments import Moments
 N_ALPHAS = 25
 # λ from one that flattens the policy to one at the resolution of H, relative to H's largest eigenvalue.
 SMALLEST, LARGEST = 1e-12, 1e0
+# Candidates whose held-out risk is within this share of the least cannot be told apart, and the largest is taken:
+# where no sample shows a direction the risk is flat over many decades of λ, and a small λ would leave there whatever
+# slight misfits happen to ask for, many times the policy.
+INDISTINGUISHABLE = 0.01
 
 
 class EpisodeFolds:
@@ -52,7 +56,7 @@ class EpisodeFolds:
 
 
 def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """The λ with the least risk on folds left out one at a time.
+    """The λ with the least risk on folds left out one at a time, or the largest that is as good.
 
     Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
     each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added. `scale` is the
@@ -74,7 +78,8 @@ def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray,
         candidates = train.decompose().solve(alphas)
         error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
     error /= sum(float(fold.weight.sum()) for fold in folds)
-    return float(alphas[np.argmin(error)]), alphas, error
+    as_good = error <= (1 + INDISTINGUISHABLE) * error.min()
+    return float(alphas[as_good].max()), alphas, error
 
 
 def held_out_predictions(policy, X, U, groups=None, n_folds: int = 5, **fit_params) -> np.ndarray:

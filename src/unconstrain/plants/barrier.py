@@ -71,9 +71,16 @@ class Barrier:
 
 
 def with_gap(
-    widths: ArrayLike, x: float, bottom: float, *, thickness: float, span: float, height: float
+    widths: ArrayLike,
+    x: float,
+    bottom: float,
+    *,
+    thickness: float,
+    span: float,
+    height: float,
+    centre: float = 0.0,
 ) -> Barrier:
-    """A barrier across the robot's way with a gap in the middle, one for each of the `widths` (S,).
+    """A barrier across the robot's way with a gap in it, one for each of the `widths` (S,).
 
     Parameters
     ----------
@@ -83,6 +90,8 @@ def with_gap(
         Distance in front of the robot to the barrier's middle, and height of its foot, in metres.
     thickness, span, height : float
         Extents along x, y and z, in metres.
+    centre : float
+        Where along y the gap's middle is, in metres.
     """
     half = np.clip(np.atleast_1d(np.asarray(widths, dtype=np.float64)), 0.0, span) / 2
     if half.ndim != 1:
@@ -90,8 +99,8 @@ def with_gap(
     low, high = np.empty((len(half), 2, 3)), np.empty((len(half), 2, 3))
     low[..., 0], high[..., 0] = x - thickness / 2, x + thickness / 2
     low[..., 2], high[..., 2] = bottom, bottom + height
-    low[:, 0, 1], high[:, 0, 1] = half, span / 2
-    low[:, 1, 1], high[:, 1, 1] = -span / 2, -half
+    low[:, 0, 1], high[:, 0, 1] = np.minimum(centre + half, span / 2), span / 2
+    low[:, 1, 1], high[:, 1, 1] = -span / 2, np.maximum(centre - half, -span / 2)
     return Barrier(low, high)
 
 

@@ -47,16 +47,16 @@ class Humanoid:
         path: str | os.PathLike[str] | None = None,
         *,
         lock: Iterable[str] | Mapping[str, float] = (),
-        hands: Iterable[str] = (),
-        feet: Iterable[str] = (),
+        hands: str | Iterable[str] = (),
+        feet: str | Iterable[str] = (),
     ) -> "Humanoid":
         """The project's own humanoid, or any robot from an MJCF or URDF file.
 
         Parameters
         ----------
         path : of the robot's file; without it the humanoid that is shipped with the library.
-        lock : joints to hold still, as for `Robot`.
-        hands : names of the left and the right hand's frame; needed for any robot but our own.
+        lock : joints to hold still, as for `Robot`; names may also come in one string, with commas.
+        hands : names of the left and the right hand's frame; needed for any robot but our own. "LEFT,RIGHT" will do.
         feet : names of the left and the right foot's body, to be kept on the floor while the pelvis moves; without
             them another robot's base stands still.
 
@@ -65,8 +65,10 @@ class Humanoid:
         RobotError
             There is no such file, joint or frame, or not two hands.
         """
-        robot = Robot.load(MODEL if path is None else path, lock=lock)
-        hands, feet = tuple(hands), tuple(feet)
+        robot = Robot.load(
+            MODEL if path is None else path, lock=names(lock) if isinstance(lock, str) else lock
+        )
+        hands, feet = names(hands), names(feet)
         if path is None:
             hands, feet = hands or HANDS, feet or FEET
         for name, frames, allowed in (("hands", hands, (2,)), ("feet", feet, (0, 2))):
@@ -169,6 +171,13 @@ class Humanoid:
         mujoco.mj_collision(model, data)
         bodies = model.geom_bodyid[data.contact.geom.reshape(-1, 2)]
         return {(int(a), int(b)) for a, b in np.sort(bodies, axis=1)}
+
+
+def names(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Names given one by one, or in one string with commas."""
+    if isinstance(given, str):
+        return tuple(name.strip() for name in given.split(",") if name.strip())
+    return tuple(given)
 
 
 def _keyframe(robot: Robot, name: str) -> Array | None:

@@ -13,16 +13,26 @@ from unconstrain.comparison import select_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.identifiability import identifiability
+from unconstrain.learnt_constraints import (
+    ConstantConstraint,
+    ConstraintChain,
+    FeatureConstraint,
+    NullspaceComponent,
+)
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
 from unconstrain.readers import load, save
 
 __version__ = version("unconstrain")
 
 __all__ = [
+    "ConstantConstraint",
+    "ConstraintChain",
     "DecoupledFeatures",
     "Demonstrations",
+    "FeatureConstraint",
     "LocallyLinearPolicy",
     "NormalizedRBF",
+    "NullspaceComponent",
     "ParametricPolicy",
     "PotentialFeatures",
     "constraints",

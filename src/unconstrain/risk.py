@@ -156,6 +156,28 @@ def constrained_policy_error(Pi, P, N) -> float:
     return float(np.mean(np.sum(np.einsum("nij,nj->ni", N, Pi - P) ** 2, axis=1)))
 
 
+def projected_policy_error(Pi, N, learnt) -> float:
+    """PPE, `1/N Σ ‖N_n pi_n - Ñ_n pi_n‖²`: how otherwise than the true constraint a learnt one would bend the policy.
+
+    Pi (N, d) true policy, N and learnt (N, d, d) true and learnt projections. `normalized(error, Pi)` is the nPPE,
+    `PPE / Σ_j var(pi_j)`. Source: Lin, Howard, Vijayakumar, ICRA 2015.
+    """
+    Pi = check_actions(Pi, "the true policy")
+    N, learnt = check_projections(N, *Pi.shape), check_projections(learnt, *Pi.shape)
+    return float(np.mean(np.sum(np.einsum("nij,nj->ni", N - learnt, Pi) ** 2, axis=1)))
+
+
+def projected_observation_error(U, learnt) -> float:
+    """POE, `1/N Σ ‖u_n - Ñ_n u_n‖²`: motion that a learnt constraint would have blocked, though it was seen.
+
+    U (N, d) actions (or their nullspace component), learnt (N, d, d). Needs no truth. `normalized(error, U)` is the
+    nPOE, `POE / Σ_j var(u_j)`. Source: Lin, Howard, Vijayakumar, ICRA 2015.
+    """
+    U = check_actions(U)
+    learnt = check_projections(learnt, *U.shape)
+    return float(np.mean(np.sum((U - np.einsum("nij,nj->ni", learnt, U)) ** 2, axis=1)))
+
+
 def unconstrained_policy_error(Pi, P) -> float:
     """UPE, `1/N Σ ‖pi_n - p_n‖²`, of predictions P (N, d) against the true policy Pi (N, d)."""
     return direct(Pi, P)

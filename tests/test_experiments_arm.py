@@ -81,13 +81,26 @@ def test_reproduce_writes_tables_figures_and_trials(tmp_path, monkeypatch, model
     assert outcome.choices
 
 
+def test_any_constraint_can_be_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(arm_trials, "published_rows", partial(_numbers, "published"))
+    outcome = arm.reproduce(tmp_path, trials=2, console=QUIET, constraint="0,0,1")
+    assert "| 1.5 | 0,0,1 | – |" in outcome.table
+    assert {path.stem for path in outcome.files} == {"table1_0_0_1"}
+    one = [_numbers("auto", ("0,0,1",), seed) for seed in range(2)]
+    assert len(arm_tables.auto_findings(one)) == 1
+    with pytest.raises(UnconstrainError, match="no task row 9"):
+        arm.reproduce(tmp_path, trials=2, console=QUIET, constraint="1-9")
+    with pytest.raises(UnconstrainError, match="leave out constraint and model"):
+        arm.reproduce(tmp_path, trials=2, console=QUIET, constraint="1-2-3", physics=True)
+
+
 def test_a_wrong_choice_is_counted():
-    results = [_numbers("auto", seed) for seed in range(3)]
+    results = [_numbers("auto", CONSTRAINTS, seed) for seed in range(3)]
     results[1][row(1.5, "1-2-3")]["chosen"] = "RBF"
     assert "In 1 of 24 data sets another candidate was nearer" in arm_tables.auto_findings(results)[1]
 
 
-def _numbers(model, seed):
+def _numbers(model, constraints, seed):
     """Trials' numbers, to write tables of: errors that differ by row and candidate."""
     rng = np.random.default_rng(seed)
     names = ("inconsistency", "direct", "oracle") if model == "published" else tuple(arm_trials.candidates())
@@ -96,7 +109,7 @@ def _numbers(model, seed):
     one = {f"{name} {key}": scale[name] * rng.uniform(0.01, 0.02) for name in names for key in keys}
     one |= {"local models": 50, "alpha": 0.1} if model == "published" else {"chosen": "locally linear"}
     powers = POWERS if model == "published" else POWERS[:2]
-    return {row(p, c): dict(one) for p in powers for c in CONSTRAINTS}
+    return {row(p, c): dict(one) for p in powers for c in constraints}
 
 
 def test_an_unknown_model_is_told(tmp_path):

@@ -26,20 +26,41 @@ def reproduce(
     model: Annotated[
         str | None, typer.Option("--model", help="arm, grasp: auto chooses the model by the data.")
     ] = None,
+    constraint: Annotated[
+        str | None,
+        typer.Option("--constraint", help="arm: task rows 1-2-3, a plane's normal 0,0,1, or a matrix."),
+    ] = None,
     physics: Annotated[
         bool, typer.Option("--physics", help="arm: with simulated dynamics and contact.")
     ] = False,
-    robot: Annotated[Path | None, typer.Option("--robot", help="grasp: your robot, MJCF or URDF.")] = None,
-    lock: Annotated[
-        str | None, typer.Option("--lock", help="grasp: joints of it to lock, by commas.")
+    robot: Annotated[
+        Path | None, typer.Option("--robot", help="grasp, posture: your robot, MJCF or URDF.")
     ] = None,
-    hands: Annotated[str | None, typer.Option("--hands", help="grasp: its hand frames, LEFT,RIGHT.")] = None,
+    lock: Annotated[
+        str | None, typer.Option("--lock", help="grasp, posture: joints of it to lock, by commas.")
+    ] = None,
+    hands: Annotated[
+        str | None, typer.Option("--hands", help="grasp, posture: its hand frames, LEFT,RIGHT.")
+    ] = None,
+    feet: Annotated[
+        str | None,
+        typer.Option(
+            "--feet", help="grasp: its foot bodies, LEFT,RIGHT; without them its base stands still."
+        ),
+    ] = None,
     video: Annotated[Path | None, typer.Option("--video", help="grasp: also render a video.")] = None,
 ) -> None:
     """Run an experiment: table "published | ours", figures, and all trials as JSON."""
     console = Console()
     out = out or Path("reproduction") / ("" if name == "all" else name)
-    options: dict[str, Any] = {"model": model, "robot": robot, "lock": lock, "hands": hands, "video": video}
+    options: dict[str, Any] = {
+        "model": model,
+        "constraint": constraint,
+        "robot": robot,
+        "lock": lock,
+        "hands": hands,
+        "video": video,
+    }
     options = {option: value for option, value in options.items() if value is not None}
     if physics:
         options["physics"] = True

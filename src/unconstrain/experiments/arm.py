@@ -1,6 +1,8 @@
 """The arm (section 4.2, Table I): as published, by models that know more about policies, and in physics."""
 
 import json
+import re
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -11,6 +13,7 @@ from unconstrain.experiments import arm_tables, arm_trials
 from unconstrain.experiments.arm_figures import table_figure
 from unconstrain.experiments.outcome import Outcome
 from unconstrain.experiments.trials import run_trials
+from unconstrain.plants.task import TaskConstraint
 
 TRIALS = 100
 MODELS = ("published", "auto")
@@ -44,37 +47,49 @@ def reproduce(
     jobs: int = 1,
     console: Console,
     model: str = "published",
+    constraint: str | None = None,
     physics: bool = False,
 ) -> Outcome:
     """Table I, "published | ours".
 
     out: the folder to write to. trials: data sets, 100 as published by default (50 in physics). jobs: processes.
     model: "published" for the paper's local linear models, "auto" for a choice among six by inconsistency alone.
+    constraint: one instead of the published four: task rows "1-2-3", a plane's normal "0,0,1", or a matrix; see
+        `plants.task.TaskConstraint.of`.
     physics: the arm moves by MuJoCo's dynamics instead, and is constrained by contact; needs the extra `sim`.
 
-    Raises `UnconstrainError` for an unknown model.
+    Raises `UnconstrainError` for an unknown model or constraint.
     """
     if model not in MODELS:
         raise UnconstrainError(f"there is no model {model!r} for the arm: choose {' or '.join(MODELS)}")
     if physics:
+        if constraint is not None or model != "published":
+            raise UnconstrainError(
+                "in physics the hand is gripped or on a table, and all models are compared: leave out constraint and "
+                "model"
+            )
         from unconstrain.experiments import arm_physics
 
         return arm_physics.reproduce(out, trials=trials, jobs=jobs, console=console)
-    name, trial = "table1", arm_trials.published_rows
+    constraints = arm_trials.CONSTRAINTS if constraint is None else (_checked(constraint),)
+    name, rows = "table1", arm_trials.published_rows
     if model == "auto":
-        name, trial = "auto", arm_trials.auto_rows
+        name, rows = "auto", arm_trials.auto_rows
+    if constraint is not None:
+        name += "_" + re.sub("[^0-9]+", "_", constraints[0]).strip("_")
+    settings = {"model": model, "constraints": constraints, **arm_trials.SETTINGS}
     results = run_trials(
-        trial,
+        partial(rows, constraints),
         TRIALS if trials is None else trials,
         out / f"{name}.jsonl",
-        settings={"model": model, **arm_trials.SETTINGS},
+        settings=settings,
         jobs=jobs,
         console=console,
         label=f"arm, {model}",
     )
     written = out / f"{name}.json"
     with atomic.replacing(written) as temporary:
-        temporary.write_text(json.dumps({"settings": arm_trials.SETTINGS, "trials": results}, indent=1))
+        temporary.write_text(json.dumps({"settings": settings, "trials": results}, indent=1))
     pictures = [figures.save(table_figure(results), out / f"{name}{suffix}") for suffix in (".png", ".svg")]
     if model == "auto":
         return Outcome(
@@ -93,6 +108,13 @@ def reproduce(
         findings=arm_tables.published_findings(results),
         files=(written, pictures[1], out / f"{name}.jsonl"),
     )
+
+
+def _checked(constraint: str) -> str:
+    """The constraint's text, once it and its complement are known to make sense."""
+    understood = TaskConstraint.of(constraint)
+    understood.complement()
+    return understood.name
 
 
 def _caption(models: str, trials: int) -> str:

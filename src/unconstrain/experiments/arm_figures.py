@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from unconstrain import figures
 from unconstrain.experiments import published
-from unconstrain.experiments.arm_tables import ERRORS, NONLINEAR, values
+from unconstrain.experiments.arm_tables import ERRORS, constraints, nonlinear, values
 
 ORACLE = "#009E73"
 
@@ -29,19 +29,22 @@ def table_figure(results: Sequence[dict[str, dict[str, Any]]]) -> Figure:
         ]
     )
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
-    at = np.arange(len(NONLINEAR)) + np.array([0.4 * (p > 1.5) for p, _ in NONLINEAR])
+    rows, each = nonlinear(results), len(constraints(results))
+    at = np.arange(len(rows)) + np.array([0.4 * (p > 1.5) for p, _ in rows])
+    known = np.array([key in published.ARM for key in rows])
     for ax, error in zip(figure.subplots(1, len(ERRORS), sharey=True), ERRORS, strict=True):
-        means, spreads = np.array([published.ARM[key][error] for key in NONLINEAR]).T
-        _points(ax, at - 0.24, means, spreads, color=figures.TRUE, fmt="s", label="published")
+        if known.any():
+            means, spreads = np.array([published.ARM[key][error] for key in rows if key in published.ARM]).T
+            _points(ax, at[known] - 0.24, means, spreads, color=figures.TRUE, fmt="s", label="published")
         for i, (label, name, color, marker) in enumerate(series):
-            numbers = np.array([values(results, *key, f"{name} {error}") for key in NONLINEAR])
+            numbers = np.array([values(results, *key, f"{name} {error}") for key in rows])
             _points(
                 ax, at - 0.08 + 0.16 * i, numbers.mean(axis=1), numbers.std(axis=1),
                 color=color, fmt=marker, label=label,
             )  # fmt: skip
         ax.set_yscale("log")
-        ax.set_xticks(at, [constraint for _, constraint in NONLINEAR], rotation=45)
-        for p, middle in ((1.5, 1.5), (1.8, 5.9)):
+        ax.set_xticks(at, [constraint for _, constraint in rows], rotation=45)
+        for p, middle in ((1.5, at[:each].mean()), (1.8, at[each:].mean())):
             ax.annotate(f"p = {p}", (middle, -0.2), xycoords=("data", "axes fraction"), ha="center")
         ax.set_title(error, fontsize=10.5)
         ax.grid(axis="y", alpha=0.3)

@@ -6,6 +6,7 @@ and twice the spread. So `Recordings.test` holds samples, λ is chosen on sample
 test, on trajectories from new starts, is reported beside it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -156,14 +157,14 @@ def auto_trial(p: float, constraint: str, seed: int, episodes: int = EPISODES) -
     return result
 
 
-def published_rows(seed: int) -> dict[str, Any]:
-    """All rows of Table I for one number of data set, by `row`."""
-    return {row(p, c): published_trial(p, c, seed) for p in POWERS for c in CONSTRAINTS}
+def published_rows(constraints: Sequence[str], seed: int) -> dict[str, Any]:
+    """The rows of Table I under these constraints for one number of data set, by `row`."""
+    return {row(p, c): published_trial(p, c, seed) for p in POWERS for c in constraints}
 
 
-def auto_rows(seed: int) -> dict[str, Any]:
-    """The rows of Table I whose policy is not linear for one number of data set, by `row`."""
-    return {row(p, c): auto_trial(p, c, seed) for p in POWERS[:2] for c in CONSTRAINTS}
+def auto_rows(constraints: Sequence[str], seed: int) -> dict[str, Any]:
+    """The rows whose policy is not linear, likewise."""
+    return {row(p, c): auto_trial(p, c, seed) for p in POWERS[:2] for c in constraints}
 
 
 def row(p: float, constraint: str) -> str:

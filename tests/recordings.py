@@ -1,6 +1,7 @@
 """Recordings on disk for the tests of streams: the same samples, cut into files in different ways."""
 
 import json
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -79,3 +80,9 @@ def lerobot(folder, X, U, episodes, time, version="v3.0", names=None):
         name = f"file-{i:03d}.parquet" if together > 1 else f"episode_{i:06d}.parquet"
         pq.write_table(table, folder / "data" / "chunk-000" / name)
     return folder
+
+
+def slowly(X):
+    """Features that take their time; here, where worker processes can import it."""
+    time.sleep(0.05)
+    return np.tanh(X)

@@ -119,6 +119,22 @@ def test_gaps_make_episodes_as_loading_does(tmp_path):
     )
 
 
+def test_episodes_too_broken_to_differentiate_are_left_out(tmp_path):
+    time = TIME.copy()
+    own = np.flatnonzero(np.isin(EPISODES, EPISODES[300]))
+    time[own] += 5.0 * (np.arange(len(own)) // 3)
+    columns = COLUMNS | {"action": None, "time": "timestamp", "gap": 1.0}
+    recordings.write(tmp_path / "one", X, U, EPISODES, time, [])
+    demos = uc.load(tmp_path / "one" / "part-0.parquet", **columns)
+    whole = uc.ParametricPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
+    assert len(demos) == len(X) - len(own)
+    policy = stream.fit_stream(uc.ParametricPolicy(alpha="cv"), tmp_path / "one", **columns, batch_rows=1)
+    assert_same_fit(policy, whole)
+    recordings.write(tmp_path / "none", X[own], U[own], EPISODES[own], time[own], [])
+    with pytest.raises(uc.errors.DataError, match="no episode has a fragment long enough"):
+        stream.fit_stream(uc.ParametricPolicy(), tmp_path / "none", **columns)
+
+
 def test_small_data_are_placed_as_fit_places_them(tmp_path):
     folder = recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, [200])
     for make in (

@@ -8,7 +8,7 @@
 
 from importlib.metadata import version
 
-from unconstrain import constraints, errors, features, risk
+from unconstrain import constraints, distributed, errors, features, moments, risk
 from unconstrain.comparison import select_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
@@ -21,6 +21,7 @@ from unconstrain.learnt_constraints import (
 )
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
 from unconstrain.readers import load, save
+from unconstrain.stream import fit_stream
 
 __version__ = version("unconstrain")
 
@@ -36,12 +37,15 @@ __all__ = [
     "ParametricPolicy",
     "PotentialFeatures",
     "constraints",
+    "distributed",
     "errors",
     "features",
+    "fit_stream",
     "identifiability",
     "load",
     "load_compiled",
     "load_policy",
+    "moments",
     "risk",
     "save",
     "select_policy",

@@ -33,6 +33,8 @@ class EpisodeFolds:
         """The fold of each sample, (N,), for episode labels `groups` (N,), or None."""
         if groups is None:
             return np.arange(n_samples) * self.n_folds // n_samples
+        if not n_samples:
+            return np.zeros(0, dtype=int)
         # An episode's samples mostly follow each other, so only where the label changes is it looked at.
         starts = np.concatenate([[True], groups[1:] != groups[:-1]])
         fold_of, deal = self.fold_of, self.n_folds

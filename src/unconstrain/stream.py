@@ -205,6 +205,11 @@ def begin(
 def finish(policy: Policy, work: Policy, tally: Tally):
     """Solve, and give `policy` what `work` has learnt; only here does it change."""
     before = work.n_samples_seen_
+    if before + tally.n_samples == 0:
+        raise DataError(
+            "no episode has a fragment long enough to be differentiated: raise gap or max_speed, or lower window or "
+            "min_duration"
+        )
     if before + tally.n_samples < 2:
         raise DataError("one sample (n_samples = 1) is not enough: a policy needs 2 or more")
     if not before and not tally.n_counted:

@@ -243,9 +243,11 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
         for k in [0] if fold is None else np.unique(fold[counted]):
             rows = counted if fold is None else counted & (fold == k)
+            if not rows.any():
+                continue
             if rows.all():
                 moments[k] = self._moments(X, seen, weights)
-            elif rows.any():
+            else:
                 index = np.flatnonzero(rows)
                 moments[k] = self._moments(X[index], seen[index], weights[index])
         return Tally(

@@ -14,7 +14,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.readers import lerobot, saved
 from unconstrain.readers.blocks import Array, Block, Samples
-from unconstrain.readers.loading import derived
+from unconstrain.readers.loading import NothingLeft, derived
 from unconstrain.readers.roles import Keys
 from unconstrain.readers.shards import Field, Paths, Piece, Shards
 from unconstrain.readers.stamps import seconds
@@ -104,6 +104,16 @@ class Dataset:
             return rows * EpisodeFolds().n_folds // self.n_rows
         return self._files(pieces)
 
+    def labels(self, start: int, stop: int) -> Iterator[tuple[NDArray[Any], int]]:
+        """The episode labels of rows `start` to `stop`, some at a time, each with the row where they begin.
+
+        Nothing but the episode column is read.
+        """
+        column = self.episode or self.state[0].column
+        for piece in self.shards.pieces([column], start, stop):
+            yield self.groups([piece], start), start
+            start += len(piece.rows)
+
     def _files(self, pieces: list[Piece]) -> NDArray[np.int64]:
         return np.repeat([piece.file for piece in pieces], [len(piece.rows) for piece in pieces])
 
@@ -180,14 +190,11 @@ class Dataset:
             stamps,
             episode_labels=[str(label) for label in labels[begins]],
         )
-        demos = derived(
-            demos,
-            self.shards.name(pieces[0].file),
-            window=how.window,
-            gap=how.gap,
-            max_speed=how.max_speed,
-            min_duration=how.min_duration,
-        )
+        limits = {"gap": how.gap, "max_speed": how.max_speed, "min_duration": how.min_duration}
+        try:
+            demos = derived(demos, self.shards.name(pieces[0].file), window=how.window, **limits)
+        except NothingLeft:  # of this block, which is no more than a part of the recording
+            return Samples(X[:0], X[:0], labels[:0])
         # A fragment of a broken episode is an episode of its own; counted from its block's first row, none is twice.
         return Samples(demos.states, demos.actions, start + demos.episodes)
 

@@ -141,6 +141,10 @@ def load(
     return demos if min_speed is None else demos.moving(min_speed)
 
 
+class NothingLeft(DataError):
+    """A recording of which no fragment is long enough."""
+
+
 def derived(
     demos: Demonstrations,
     shown: str,
@@ -196,7 +200,7 @@ def _split(
     )
     shortest = max(window if differentiated else 0.0, min_duration or 0.0)
     if not len(found.samples):
-        raise DataError(
+        raise NothingLeft(
             f"{shown}: split at {found.gaps} gaps and {found.fast} fast steps, no fragment lasts "
             f"{shortest:g} s; raise gap or max_speed, or lower window or min_duration"
         )

@@ -53,13 +53,14 @@ class Shards:
     """Parquet files one after the other, as one table.
 
     shown: what the user called them. paths: of the files, in `filesystem`. row_groups: the rows of each row group, a
-    tuple a file.
+    tuple a file. threads: whether columns are decoded side by side.
     """
 
     shown: str
     filesystem: Any
     paths: tuple[str, ...]
     row_groups: tuple[tuple[int, ...], ...]
+    threads: bool = True
 
     @classmethod
     def find(cls, source: Paths) -> "Shards":
@@ -225,7 +226,9 @@ class Shards:
             return
         at = int(bounds[groups[0]])
         with _NamedErrors(self.name(file)), self._open(self.paths[file]) as opened:
-            batches = opened.iter_batches(DECODED, row_groups=groups, columns=list(columns))
+            batches = opened.iter_batches(
+                DECODED, row_groups=groups, columns=list(columns), use_threads=self.threads
+            )
             while True:
                 rows = next(batches, None)
                 if rows is None:

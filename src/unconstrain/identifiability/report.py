@@ -9,7 +9,6 @@ from sklearn.utils.validation import check_is_fitted
 
 from unconstrain import risk as risks
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.features import NormalizedRBF
 from unconstrain.features.centers import activations, farthest_first
 from unconstrain.identifiability import bound as bounding
 from unconstrain.identifiability import information as informing
@@ -81,10 +80,10 @@ class Recordings:
 
 @dataclass(frozen=True)
 class Region:
-    """Somewhere the policy is not known: at `state` (n,), along `direction` (d,), to within `deviation`.
+    """Somewhere the policy is not known: at `state` (n,), where motion along `direction` (d,) was seen least.
 
-    deviation: standard deviation along the direction, speed: of the prediction there, both in units of the action.
-    seen: share of the motions near the state that went along the direction; one of d would be 1/d.
+    deviation: standard deviation of the policy along the direction; speed: of the prediction; in units of the action.
+    seen: share of the motion near the state that went along the direction; 1/d where all directions were seen alike.
     """
 
     state: np.ndarray
@@ -172,39 +171,45 @@ class Identifiability:
         X = check_states(self.policy, X)
         return self.policy._deviation(X, self.policy._evaluate(X), self.posterior)
 
-    def unseen_directions(self, X) -> Coverage:
-        """Near each state of X (Q, n), the directions of motion, least seen first: see `coverage`."""
+    def unseen_directions(self, X, reach: float | None = None) -> Coverage:
+        """Near each state of X (Q, n), the directions of motion, least seen first: see `coverage`.
+
+        reach: σ of what "near" means, in units of the states; by default `self.reach`.
+        """
         near = self._needed("which directions were seen near a state")
-        return coverage(check_states(self.policy, X), near.X, near.U, self.reach)
+        width = self.reach if reach is None else check_number(reach, "reach", positive=True)
+        return coverage(check_states(self.policy, X), near.X, near.U, width)
 
     @property
     def reach(self) -> float:
-        """σ of what "near a state" means: the model's own width, or else Scott's rule, in units of the states."""
-        transformer = getattr(getattr(self.policy, "features_", None), "transformer_", None)
-        if self._local or isinstance(transformer, NormalizedRBF):
-            return float((self.policy if self._local else transformer).width_)  # type: ignore[union-attr]
+        """Scott's rule for the recorded states, `s N^(-1/(n+4))`, s the root of their mean variance over dimensions.
+
+        Not the model's width: how far a model generalises is an assumption, what was seen near a state is not.
+        """
         X = self._needed("how far apart the states lie").X
         spread = float(np.sqrt(np.mean(np.var(X, axis=0))))
         return spread * len(X) ** (-1.0 / (X.shape[1] + 4)) or 1.0
 
     def worst_regions(self, k: int = 3) -> list[Region]:
-        """The k recorded states, apart from each other, where the policy is known least, the worst first."""
+        """The k recorded states, apart from each other, where the policy is known least, the worst first.
+
+        Ordered by the posterior's largest standard deviation. The direction is that of the motion least seen there.
+        """
         near = self._needed("where the policy is known least")
         pool, radius = farthest_first(near.X, n_centers=POOL)
-        values, vectors = np.linalg.eigh(self.covariance(pool))
+        covariance = self.covariance(pool)
         speeds = np.linalg.norm(self.policy._evaluate(pool), axis=1)
-        seen = coverage(pool, near.X, near.U, self.reach)
+        order = np.argsort(np.linalg.eigvalsh(covariance)[:, -1])[::-1]
         chosen: list[int] = []
-        for i in np.argsort(values[:, -1])[::-1].tolist():
-            apart = [np.linalg.norm(pool[i] - pool[j]) for j in chosen]
-            if len(chosen) < k and min(apart, default=np.inf) > max(2 * radius, self.reach / 2):
+        for i in order.tolist():
+            apart = min((np.linalg.norm(pool[i] - pool[j]) for j in chosen), default=np.inf)
+            if len(chosen) < k and apart > max(2 * radius, 2 * self.reach):
                 chosen.append(i)
+        seen = self.unseen_directions(pool[chosen])
         result = []
-        for i in chosen:
-            q = _oriented(vectors[i, :, -1])
-            share = float(np.sum(seen.shares[i] * (seen.directions[i] @ q) ** 2))
-            deviation = float(np.sqrt(max(values[i, -1], 0.0)))
-            result.append(Region(pool[i], q, deviation, float(speeds[i]), share))
+        for i, share, q in zip(chosen, seen.shares[:, 0], seen.directions[:, 0], strict=True):
+            deviation = float(np.sqrt(max(q @ covariance[i] @ q, 0.0)))
+            result.append(Region(pool[i], _oriented(q), deviation, float(speeds[i]), float(share)))
         return result
 
     def next_recordings(

@@ -20,9 +20,9 @@ def described(
     lines += ["", "least known:"]
     for region in report.worst_regions(k):
         lines.append(
-            f"  at {place(region.state, state_names)}: along {direction(region.direction, action_names)}, to within "
-            f"±{region.deviation:.3g} (the policy's speed there is {region.speed:.3g}; "
-            f"{region.seen:.1%} of the motion seen near there went that way)"
+            f"  at {place(region.state, state_names)}: along {direction(region.direction, action_names)} to within "
+            f"±{region.deviation:.3g}, where the policy's speed is {region.speed:.3g}; {region.seen:.1%} of the motion "
+            "recorded near there went that way"
         )
     if report.recordings is not None and report.recordings.episodes is not None:
         lines += ["", *episodes(report)]

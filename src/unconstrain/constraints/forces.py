@@ -27,6 +27,10 @@ FRICTION = 0.5
 """Share of the measured force that has to be at right angles to the motion: that of friction coefficients up to √3."""
 
 
+SLOW = 0.1
+"""Below this share of the root mean square speed, the direction of motion is noise and friction is left in."""
+
+
 def contact(
     forces: ArrayLike,
     threshold: float,
@@ -165,7 +169,7 @@ def from_forces(
 
 
 def _directions(U: Array, F: Array, J: Array | None) -> Array:
-    """Directions (N, m) in which the point touched moves; zero where it rests."""
+    """Directions (N, m) in which the point touched moves; zero where it hardly does."""
     if len(U) != len(F):
         raise DataError(f"there are {len(F)} forces and {len(U)} actions: give one force a sample")
     if J is not None and U.ndim == 2 and U.shape[1] != J.shape[2]:
@@ -177,7 +181,8 @@ def _directions(U: Array, F: Array, J: Array | None) -> Array:
             "the force along the actions, or the Jacobian that leads from one to the other"
         )
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
-    return np.divide(velocity, speed, out=np.zeros_like(velocity), where=speed > 0)
+    moves = speed > SLOW * np.sqrt(np.mean(speed**2))
+    return np.divide(velocity, speed, out=np.zeros_like(velocity), where=moves)
 
 
 def _across(F: Array, along: Array) -> Array:

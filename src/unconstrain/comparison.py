@@ -27,7 +27,7 @@ from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
-from unconstrain.validation import check_actions, check_groups, check_projections, check_samples
+from unconstrain.validation import check_actions, check_groups, check_number, check_projections, check_samples
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
@@ -178,6 +178,8 @@ def select_policy(
             progress(row)
     rows.sort(key=lambda row: (row.problem is not None, row.inconsistency))
     if rows[0].problem is not None:
+        if len({row.problem for row in rows}) == 1:
+            raise PolicyError(rows[0].problem)
         raise PolicyError(
             f"none of the candidates could be fitted; the first, {rows[0].name}: {rows[0].problem}"
         )
@@ -232,6 +234,8 @@ def _judge(name: str, policy: Policy, X, U, groups, projections) -> tuple[Row, P
 
 def _hold_out(policy: Policy, X, U, groups, projections) -> tuple[Policy, np.ndarray, np.ndarray]:
     """The policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
+    if policy.alpha != "cv":  # `fit` does not get to see it
+        check_number(policy.alpha, "alpha", positive=False)
     fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)
     if policy.alpha != "cv":  # the folds are needed all the same, the choice is not
         fitted = fitted.set_params(alpha=policy.alpha).solved()

@@ -8,10 +8,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from unconstrain import atomic, figures, selection
+from unconstrain.cli import reporting
+from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.experiments import toy
@@ -29,7 +30,7 @@ def demo(
     ] = Path("unconstrain-demo"),
 ) -> None:
     """Simulate 40 constrained movements, learn the policy behind them, draw it."""
-    console = Console()
+    console = reporting.console()
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -53,15 +54,11 @@ def demo(
     console.print(
         "nUPE, nCPE: squared error without and with constraints, as a share of the policy's variance"
     )
-    console.print(
-        f"picture: {picture}\ntable: {out / 'table.md'}\ndata: {out / 'movements.csv'}", soft_wrap=True
-    )
+    console.print(f"picture: {picture}\ntable: {out / 'table.md'}\ndata: {out / 'movements.csv'}")
     console.print("\nnext, the same from a file (put your own in its place):")
     console.print(
-        f"  unconstrain fit {out / 'movements.csv'} --state x1,x2 --action u1,u2 --episode episode --model rbf "
-        f"--out {out / 'policy.skops'}",
-        soft_wrap=True,
-        highlight=False,
+        f"  unconstrain fit {quoted(out / 'movements.csv')} --state x1,x2 --action u1,u2 --episode episode --model rbf "
+        f"--out {quoted(out / 'policy.skops')}",
     )
 
 

@@ -5,11 +5,10 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from unconstrain import risk, selection
-from unconstrain.cli import recordings
+from unconstrain.cli import recordings, reporting
 from unconstrain.cli.fit import describe
 from unconstrain.cli.recordings import (
     Action,
@@ -44,7 +43,7 @@ def evaluate(
 ) -> None:
     """Hold a saved policy against other recordings.
 
-    They are read as those it was learnt from, unless an option says otherwise; with --state, all columns are named anew.
+    They are read as those it was learnt from, unless an option says otherwise; --state names all columns anew.
     """
     learnt = load_policy(policy)
     how = recordings.asked(
@@ -60,7 +59,7 @@ def evaluate(
         min_duration=min_duration,
     )
     how = recordings.as_before(getattr(learnt, "recording_", {}), how)
-    console = Console()
+    console = reporting.console()
     demos = recordings.read(files, how)
     describe(console, demos)
     if demos.states.shape[1] != learnt.n_features_in_ or demos.actions.shape[1] != learnt.n_actions_:

@@ -10,7 +10,7 @@ from rich.table import Table
 from sklearn.base import clone
 
 from unconstrain import comparison, figures
-from unconstrain.cli import models, recordings
+from unconstrain.cli import models, recordings, reporting
 from unconstrain.cli.recordings import (
     Action,
     Episode,
@@ -24,12 +24,14 @@ from unconstrain.cli.recordings import (
     Window,
 )
 from unconstrain.cli.recordings import TimeUnit as Unit
+from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import PolicyError
+from unconstrain.errors import DataError, PolicyError
 from unconstrain.policies.base import Policy
 from unconstrain.validation import check_choice
 
 BLOCKS = 5
+FOLDS = ("episodes", "blocks")
 
 Model = Annotated[str, typer.Option("--model", help=f"One of {', '.join(models.MODELS)}.")]
 Out = Annotated[Path, typer.Option("--out", help="Where the policy is saved.")]
@@ -83,6 +85,8 @@ def fit(
     figures.check_suffix(figure)
     check_choice(model, "--model", models.MODELS)
     check_choice(risk, "--risk", ("inconsistency", "direct"))
+    if folds is not None:
+        check_choice(folds, "--folds", FOLDS)
     how = recordings.asked(
         state,
         action,
@@ -98,11 +102,11 @@ def fit(
     named = _candidates(
         model, risk=risk, alpha=models.decay(alpha), centers=centers, n_centers=n_centers, width=width
     )
-    console = Console()
+    console = reporting.console()
     with console.status("reading"):
         demos = recordings.read(files, how)
     describe(console, demos)
-    groups = _groups(demos, folds)
+    groups = folds_of(demos, folds)
 
     chosen, table = _compare(console, demos, groups, model, named, risk)
     policy = table.policies[chosen]
@@ -121,12 +125,10 @@ def fit(
     console.print(f"policy: {out}")
     start = ",".join(f"{value:.3g}" for value in demos.states[0])
     console.print("\nnext, on recordings the policy has not seen, or to see where it leads:")
-    console.print(f"  unconstrain evaluate {_quoted(out)} OTHER_FILES...", soft_wrap=True, highlight=False)
+    console.print(f"  unconstrain evaluate {quoted(out)} OTHER_FILES...")
     if demos.states.shape[1] == demos.actions.shape[1]:
         console.print(
-            f'  unconstrain rollout {_quoted(out)} --start="{start}" --steps 500 --dt 0.02',
-            soft_wrap=True,
-            highlight=False,
+            f'  unconstrain rollout {quoted(out)} --start="{start}" --steps 500 --dt 0.02',
         )
 
 
@@ -137,7 +139,7 @@ def describe(console: Console, demos: Demonstrations) -> None:
         f"states {', '.join(demos.state_names)}, actions {', '.join(demos.action_names)}"
     )
     for note in demos.notes:
-        console.print(f"note: {note}", highlight=False)
+        console.print(f"note: {note}")
 
 
 def _candidates(model: str, **options) -> dict[str, Policy] | None:
@@ -152,10 +154,12 @@ def _candidates(model: str, **options) -> dict[str, Policy] | None:
     return None
 
 
-def _groups(demos: Demonstrations, folds: str | None) -> np.ndarray:
+def folds_of(demos: Demonstrations, folds: str | None) -> np.ndarray:
     """Episodes to be held out together, or blocks of each."""
     folds = folds or ("episodes" if demos.n_episodes > 1 else "blocks")
-    check_choice(folds, "--folds", ("episodes", "blocks"))
+    check_choice(folds, "--folds", FOLDS)
+    if folds == "episodes" and demos.n_episodes < 2:
+        raise DataError("there is one episode, and none is left when it is held out: use --folds blocks")
     return demos.episodes if folds == "episodes" else demos.blocks(BLOCKS)
 
 
@@ -169,7 +173,7 @@ def _compare(console, demos, groups, model, named, risk) -> tuple[str, compariso
 
         if named is None:
             found = comparison.select_policy("auto", *data, progress=progress)
-            console.print(str(found.table), highlight=False)
+            console.print(str(found.table))
             model, named = found.name, {found.name: found.policy}
         other = "direct" if risk == "inconsistency" else "inconsistency"
         pair = {
@@ -189,8 +193,3 @@ def _report(console: Console, result: comparison.Selection, kept: str) -> None:
         name = row.name.split(", ")[-1] + (" (saved)" if row.name.endswith(kept) else "")
         table.add_row(name, f"{row.inconsistency:.4g}", f"{row.explained:.2%}")
     console.print(table)
-
-
-def _quoted(path: Path) -> str:
-    text = str(path)
-    return f'"{text}"' if " " in text else text

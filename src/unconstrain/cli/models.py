@@ -6,6 +6,7 @@ from unconstrain.errors import PolicyError
 from unconstrain.features import NormalizedRBF
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.validation import check_number
 
 MODELS = ("linear", "rbf", "locally-linear", "auto")
 
@@ -39,10 +40,11 @@ def build(
 
 
 def decay(text: str) -> str | float:
-    """`--alpha`: "cv" or a number. Raises `PolicyError` for anything else."""
+    """`--alpha`: "cv" or a number, not below zero. Raises `PolicyError` for anything else."""
     if text == "cv":
         return text
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
         raise PolicyError(f'--alpha must be a number or "cv", got {text!r}') from None
+    return check_number(number, "--alpha", positive=False)

@@ -8,10 +8,9 @@ import pyarrow as pa
 import pyarrow.csv
 import typer
 from matplotlib.figure import Figure
-from rich.console import Console
 
 from unconstrain import atomic, figures
-from unconstrain.cli import recordings
+from unconstrain.cli import recordings, reporting
 from unconstrain.errors import DataError
 from unconstrain.policies import load_policy
 from unconstrain.rollout import Rollout
@@ -52,9 +51,9 @@ def rollout(
     with atomic.replacing(out) as temporary:
         pyarrow.csv.write_csv(pa.table(columns), temporary)
     figures.save(_drawn(movement, names), figure)
-    console = Console()
+    console = reporting.console()
     end = ", ".join(f"{name} {value:.4g}" for name, value in zip(names, movement.states[-1], strict=True))
-    console.print(f"after {steps * dt:g} s: {end}", highlight=False)
+    console.print(f"after {steps * dt:g} s: {end}")
     console.print(f"movement: {out}\nfigure: {figure}")
 
 

@@ -137,9 +137,13 @@ def trial(
 
 
 def training(
-    demonstrator: Demonstrator, rng: np.random.Generator, n: int = 100, duration: float = DURATION
+    demonstrator: Demonstrator,
+    random_state: int | np.random.Generator | None,
+    n: int = 100,
+    duration: float = DURATION,
 ) -> tuple[Recording, Barrier]:
     """n movements through gaps of random width, and the barriers they met."""
+    rng = np.random.default_rng(random_state)
     obstacle = demonstrator.scene.with_gap(rng.normal(GAP_MEAN, GAP_DEVIATION, n))
     return demonstrator.record(obstacle, demonstrator.starts(n, rng), duration=duration), obstacle
 
@@ -180,7 +184,7 @@ def reproduce(
         temporary.write_text(table)
 
     console.print("drawing data set 0")
-    recording, obstacle = training(demonstrator, np.random.default_rng(0))
+    recording, obstacle = training(demonstrator, 0)
     policies: dict[str, Any] = {"expert": demonstrator.policy}
     policies["inconsistency"], _ = learn(recording.demonstrations, "inconsistency", model)
     policies["direct"], _ = learn(recording.demonstrations, "direct")

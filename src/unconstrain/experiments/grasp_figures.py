@@ -23,7 +23,7 @@ LABELS = {"expert": "expert", "inconsistency": "learnt by inconsistency", "direc
 UNSEEN_WIDTH, UNSEEN_ASIDE = 0.32, 0.04
 """The gap never trained on, in metres."""
 
-FRAMES = 6
+FRAMES, PIXELS = 6, 480
 SHOWN_MOVEMENTS = 10
 
 VIEW = {"distance": 1.65, "azimuth": 155.0, "elevation": -24.0}
@@ -72,7 +72,7 @@ def reaching_through(
     postures = recording.postures[movement]
     at = np.linspace(0, len(postures) - 1, FRAMES).round().astype(int)
     figure = Figure(figsize=(9.6, 6.6), layout="constrained")
-    with camera(demonstrator, model, 640, 640) as view:
+    with camera(demonstrator, model, PIXELS, PIXELS) as view:
         for ax, k in zip(figure.subplots(2, FRAMES // 2).ravel(), at, strict=True):
             ax.imshow(view.picture(postures[k]))
             ax.set_title(f"{k / FREQUENCY:.1f} s", fontsize=10)
@@ -155,7 +155,7 @@ def through_unseen_gap(demonstrator: Demonstrator, policies: dict[str, Any]) -> 
     ways = {name: moved(demonstrator, policy, obstacle).postures[0] for name, policy in policies.items()}
     figure = Figure(figsize=(9.6, 6.6), layout="constrained")
     axes = figure.subplots(2, len(ways))
-    with camera(demonstrator, model, 640, 640) as view:
+    with camera(demonstrator, model, PIXELS, PIXELS) as view:
         for column, (name, postures) in enumerate(ways.items()):
             for row, k in enumerate((round(0.25 * len(postures)), len(postures) - 1)):
                 ax = axes[row, column]

@@ -45,7 +45,7 @@ CHOICES = (
     f"W = {WEIGHT:g} I, so that π = -∇φ = -{2 * WEIGHT:g} (x - x_c); the step is one, x ← x + u.",
     "Starts are N(q0, 0.1 I), clipped to the joint limits and free of self-collision.",
     f"The wall stands at {NEAREST:g} to {FARTHEST:g} of the way from the hands at home to the hands outstretched, "
-    f"turned and tilted by up to {np.degrees(TILT):.0f}°, all uniformly, and drawn anew while a hand would start in it.",
+    f"turned and tilted by up to {np.degrees(TILT):.0f}°, all uniformly; drawn anew while a hand would start in it.",
     f"A hand is blocked when nearer than {CLEARANCE:g} m to the wall and led nearer still: nᵀ J u = 0. A joint whose "
     "next step would leave its limits is held.",
     "The pelvis stands still: joint space is seen from there, and the wall is met by the arms and the waist.",
@@ -222,7 +222,8 @@ def _findings(results: list[dict], n: int) -> tuple[str, ...]:
     share = np.array([result["samples the wall blocks"] for result in results])
     return (
         f"Mean nUPE {ours:.2g} with {n * (n + 1)} parameters (published "
-        f"{published.POSTURE_NUPE['inconsistency'][0]:g}); direct regression {direct:.2g}, {direct / ours:.0f} times that.",
+        f"{published.POSTURE_NUPE['inconsistency'][0]:g}); direct regression {direct:.2g}, "
+        f"{direct / ours:.0f} times that.",
         f"{100 * met.mean():.0f} % of the movements meet the wall; it blocks a hand at {100 * share.mean():.0f} % of "
         "the samples.",
     )

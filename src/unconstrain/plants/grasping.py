@@ -1,6 +1,7 @@
 """A humanoid that demonstrates how to grasp a ball, a barrier in its way (section 4.3)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -93,24 +94,27 @@ class Demonstrator:
 
     def __init__(self, humanoid: Humanoid):
         self.humanoid = humanoid
-        self.scene = Scene(WholeBody(humanoid).hands.mean(axis=0))
+        self.scene = Scene(WholeBody(humanoid).hands.mean(axis=0), humanoid.floor)
         self.policy = Attractor(self.scene.grasp)
         self._model = floating(humanoid).compile()
 
-    def starts(self, n: int, rng: np.random.Generator) -> list[WholeBody]:
+    def starts(self, n: int, rng: np.random.Generator, model: Any = None) -> list[WholeBody]:
         """n robots standing in random postures ~ N(q0, 0.1 I), free of self-collision, hands where the scene admits.
+
+        `model` is that of `WholeBody`, where the robot shall stand in a scene that is shown.
 
         Raises `UnconstrainError` if hardly any posture is admitted.
         """
         bodies: list[WholeBody] = []
-        body, tries = WholeBody(self.humanoid, self._model), 1000 + 100 * n
+        model = self._model if model is None else model
+        body, tries = WholeBody(self.humanoid, model), 1000 + 100 * n
         for _ in range(tries):
             body.stand(self.humanoid.start_postures(1, rng)[0])
             if self.scene.admits(body.hands) and not self.humanoid.touches_itself(body.posture):
                 bodies.append(body)
                 if len(bodies) == n:
                     return bodies
-                body = WholeBody(self.humanoid, self._model)
+                body = WholeBody(self.humanoid, model)
         raise UnconstrainError(
             f"Only {len(bodies)} of {tries} random postures hold both hands in front of the barrier and above "
             "the table: give another home posture or other hands."

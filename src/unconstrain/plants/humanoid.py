@@ -106,6 +106,17 @@ class Humanoid:
         return X, J
 
     @cached_property
+    def floor(self) -> float:
+        """Height of the floor in metres: the robot's lowest point at home."""
+        model, data = self.robot.model, self._data
+        data.qpos = self.home
+        simulator().mj_kinematics(model, data)
+        centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
+        turn = data.geom_xmat.reshape(-1, 3, 3)[:, 2]
+        lowest = data.geom_xpos[:, 2] + np.sum(turn * centre, axis=1) - np.sum(np.abs(turn) * half, axis=1)
+        return float(lowest.min())
+
+    @cached_property
     def outstretched(self) -> Array:
         """A posture (n,) with both arms outstretched.
 

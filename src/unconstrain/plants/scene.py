@@ -30,6 +30,7 @@ class Scene:
     ----------
     origin : array (3,)
         Midway between the hands in the robot's home posture; the offsets below count from there.
+    floor : height of the floor the table stands on.
     ball : offsets of the ball's middle.
     palm : from the ball's surface to a hand's point when it grasps.
     table_edge : offset along x of the table's near edge; its top is under the ball.
@@ -41,6 +42,7 @@ class Scene:
     """
 
     origin: Array
+    floor: float = 0.0
     ball: tuple[float, float, float] = (0.28, 0.0, -0.02)
     palm: float = 0.03
     table_edge: float = 0.06
@@ -106,12 +108,20 @@ class Scene:
         floor.rgb1, floor.rgb2 = [0.86, 0.87, 0.88], [0.82, 0.83, 0.84]
         tiles = spec.add_material(name="floor", texrepeat=[8, 8], texuniform=False, reflectance=0.05)
         tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-        world.add_geom(type=kind.mjGEOM_PLANE, size=[4, 4, 0.1], material="floor", **see_only)
-        world.add_light(
-            pos=[1.2, 1.6, 3.0], dir=[-0.35, -0.5, -1.0], diffuse=[0.55, 0.55, 0.55], castshadow=True
+        world.add_geom(
+            type=kind.mjGEOM_PLANE, pos=[0, 0, self.floor], size=[4, 4, 0.1], material="floor", **see_only
         )
         world.add_light(
-            pos=[0.5, -2.0, 2.5], dir=[0.0, 0.7, -0.8], diffuse=[0.25, 0.25, 0.28], castshadow=False
+            pos=[1.2, 1.6, self.floor + 3.0],
+            dir=[-0.35, -0.5, -1.0],
+            diffuse=[0.55, 0.55, 0.55],
+            castshadow=True,
+        )
+        world.add_light(
+            pos=[0.5, -2.0, self.floor + 2.5],
+            dir=[0.0, 0.7, -0.8],
+            diffuse=[0.25, 0.25, 0.28],
+            castshadow=False,
         )
         spec.visual.headlight.ambient = [0.35, 0.35, 0.35]
         spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
@@ -119,6 +129,7 @@ class Scene:
 
         edge, top = self.origin[0] + self.table_edge, self.table_top
         depth, half_span = 0.5, self.span / 2
+        leg = (top - 0.03 - self.floor) / 2
         wood = [0.72, 0.57, 0.42, 1.0]
         world.add_geom(
             name="table", type=kind.mjGEOM_BOX, rgba=wood, pos=[edge + depth / 2, self.origin[1], top - 0.015],
@@ -127,8 +138,8 @@ class Scene:
         for x in (edge + 0.04, edge + depth - 0.04):
             for y in (self.origin[1] - half_span + 0.04, self.origin[1] + half_span - 0.04):
                 world.add_geom(
-                    type=kind.mjGEOM_BOX, rgba=wood, pos=[x, y, (top - 0.03) / 2],
-                    size=[0.02, 0.02, (top - 0.03) / 2], **see_only,
+                    type=kind.mjGEOM_BOX, rgba=wood, pos=[x, y, self.floor + leg],
+                    size=[0.02, 0.02, leg], **see_only,
                 )  # fmt: skip
         world.add_geom(
             name="ball", type=kind.mjGEOM_SPHERE, rgba=[0.84, 0.37, 0.0, 1], pos=self.ball_centre,

@@ -59,6 +59,7 @@ def reproduce(
         "robot": robot,
         "lock": lock,
         "hands": hands,
+        "feet": feet,
         "video": video,
     }
     options = {option: value for option, value in options.items() if value is not None}

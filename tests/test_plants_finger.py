@@ -106,3 +106,11 @@ def test_each_start_can_have_its_own_obstacles():
 def test_mistakes_are_told_in_a_sentence(kind, call, sentence):
     with pytest.raises(kind, match=sentence):
         call()
+
+
+def test_outlines_are_as_thick_as_the_finger():
+    for outline in FINGER.outlines([0.4, 0.3, 0.2]):
+        assert outline.shape == (34, 2)
+    straight = FINGER.outlines(np.zeros(3)).reshape(-1, 2)
+    np.testing.assert_allclose(np.ptp(straight[:, 1]), 2 * FINGER.radius)
+    np.testing.assert_allclose(np.ptp(straight[:, 0]), sum(FINGER.lengths) + 2 * FINGER.radius)

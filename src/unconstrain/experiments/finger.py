@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from rich.console import Console
@@ -135,12 +136,16 @@ def _movement(ax: Axes, finger: Finger, movement: Demonstrations, box: Box | Non
     if box is not None:
         ax.add_patch(Polygon(box.outline(), color="#444444"))
     postures = movement.episode(0).states
-    frames = finger.joints(postures[np.linspace(0, len(postures) - 1, 6).astype(int)])
-    for i, joints in enumerate(frames):
-        shade = 0.15 + 0.85 * i / (len(frames) - 1)
-        ax.plot(*joints.T, "o-", color=figures.LEARNT, alpha=shade, lw=5, ms=6, solid_capstyle="round")
+    frames = postures[np.linspace(0, len(postures) - 1, 6).astype(int)]
+    for i, q in enumerate(frames):
+        # Mixed with white, not transparent: phalanges overlap at the joints. As thick as it is, the finger touches.
+        shade = 0.2 + 0.8 * i / (len(frames) - 1)
+        face = 1 - shade * (1 - np.array(to_rgb(figures.LEARNT)))
+        for outline in finger.outlines(q):
+            ax.add_patch(Polygon(outline, facecolor=tuple(face), edgecolor="white", lw=0.6, zorder=2 + i))
+        ax.plot(*finger.joints(q[None])[0, :-1].T, "o", color="white", ms=2.5, zorder=2 + i)
     ax.set_aspect("equal")
-    ax.set(xlim=(-0.012, 0.112), ylim=(-0.085, 0.02), xlabel="m", ylabel="m")
+    ax.set(xlim=(-0.012, 0.112), ylim=(-0.09, 0.018), xlabel="m", ylabel="m")
 
 
 def _arrows(ax: Axes, X: np.ndarray, U: np.ndarray, color: str, label: str, width: float = 0.005) -> None:

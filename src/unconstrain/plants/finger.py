@@ -21,7 +21,7 @@ TOUCHING = 1e-5
 PENETRATION = 1e-5
 """A recorded posture is never deeper inside an obstacle than this, in metres."""
 
-SUBSTEPS = 5
+SUBSTEPS = 3
 """Integration steps between two recorded samples."""
 
 
@@ -127,9 +127,8 @@ class Finger:
         only the former constrain: on them ``u = N π(q)``, and the finger slides.
         """
         posture = self._postures(np.atleast_2d(q))[0]
-        distances, rows = self._contacts(posture, _boxes(obstacles))
-        rows = rows[distances <= TOUCHING]
-        return rows[self._pressing(posture, rows)]
+        contacts = self._contacts(posture, _boxes(obstacles))
+        return contacts[1][self._pressing(posture, contacts)]
 
     def demonstrate(
         self,
@@ -174,11 +173,12 @@ class Finger:
         d = len(self.lengths)
         states, projections = np.empty((len(starts), length, d)), np.empty((len(starts), length, d, d))
         for episode, (q, boxes) in enumerate(zip(starts, scenes, strict=True)):
+            contacts = self._contacts(q, boxes)
             for k in range(length):
                 states[episode, k] = q
-                projections[episode, k] = projection(self.constraint(q, boxes))
+                projections[episode, k] = projection(contacts[1][self._pressing(q, contacts)])
                 for _ in range(SUBSTEPS):
-                    q = self._step(q, boxes, 1 / (rate * SUBSTEPS))
+                    q, contacts = self._step(q, contacts, boxes, 1 / (rate * SUBSTEPS))
         X, N = states.reshape(-1, d), projections.reshape(-1, d, d)
         wanted = self.policy(X)
         names = [f"joint{i + 1}" for i in range(d)]
@@ -193,34 +193,37 @@ class Finger:
             action_names=tuple(f"{name}_velocity" for name in names),
         )
 
-    def _step(self, q: Array, boxes: Sequence[Box], dt: float) -> Array:
-        """One integration step, and back onto the surfaces it slid along or ran into."""
-        if not boxes:
-            return q + dt * self.policy(q[None])[0]
-        distances, rows = self._contacts(q, boxes)
-        near = np.flatnonzero(distances <= TOUCHING)
-        sliding = near[self._pressing(q, rows[near])]
-        q = q + dt * projection(rows[sliding]) @ self.policy(q[None])[0]
+    def _step(
+        self, q: Array, contacts: tuple[Array, Array], boxes: Sequence[Box], dt: float
+    ) -> tuple[Array, tuple[Array, Array]]:
+        """One integration step, and back onto the surfaces it slid along or ran into: q and its contacts."""
+        sliding = self._pressing(q, contacts)
+        action = self.policy(q[None])[0]
+        q = q + dt * (projection(contacts[1][sliding]) @ action if len(sliding) else action)
+        contacts = self._contacts(q, boxes)
         # A straight step leaves a curved surface, either way, by the square of the step: a few Newton steps
         # lead back. Contacts that do not press are only pushed out, never pulled in.
         for _ in range(10):
-            distances, rows = self._contacts(q, boxes)
+            distances, rows = contacts
             off = distances < 0
             off[sliding] = True
             if np.all(np.abs(distances[off]) < PENETRATION / 10):
                 break
             q = q - np.linalg.lstsq(rows[off], distances[off], rcond=1e-6)[0]
-        return q
+            contacts = self._contacts(q, boxes)
+        return q, contacts
 
-    def _pressing(self, q: Array, rows: Array) -> NDArray[np.intp]:
-        """Which contacts push back, from ``min_u ‖u - π(q)‖²`` under ``rows u >= 0``.
+    def _pressing(self, q: Array, contacts: tuple[Array, Array]) -> NDArray[np.intp]:
+        """Which contacts push back, from ``min_u ‖u - π(q)‖²`` under ``rows u >= 0`` where finger and box touch.
 
         Its dual is ``min_λ ‖π + rowsᵀ λ‖²`` under ``λ >= 0``; contacts with λ > 0 are the active set.
         """
-        if not len(rows):
-            return np.empty(0, dtype=np.intp)
-        force, _ = nnls(rows.T, -self.policy(q[None])[0])
-        return np.flatnonzero(force > 0)
+        distances, rows = contacts
+        touching = np.flatnonzero(distances <= TOUCHING)
+        if not len(touching):
+            return touching
+        force, _ = nnls(rows[touching].T, -self.policy(q[None])[0])
+        return touching[force > 0]
 
     def _contacts(self, q: Array, boxes: Sequence[Box]) -> tuple[Array, Array]:
         """Signed distances (m,) of all places where the finger could touch, and their gradients (m, 3) in q.
@@ -228,28 +231,47 @@ class Finger:
         A phalanx (a thick line) and a box can touch at either end of the phalanx or at a corner of the box;
         a phalanx flat against a side touches at two of them. Each distance is smooth in q.
         """
-        joints = self.joints(q[None])[0]
-        on_finger, on_box, link, reach = [], [], [], []
-        for box in boxes:
-            for i, (a, b) in enumerate(pairwise(joints)):
-                along = b - a
-                share = np.clip((box.corners - a) @ along / (along @ along), 0, 1)
-                ends = np.stack([a, b])
-                on_finger.append(np.concatenate([ends, a + share[:, None] * along]))
-                on_box.append(np.concatenate([box.nearest(ends), box.corners]))
-                link += [i] * 6
-                reach += [self.radius + box.rounding] * 6
-        if not link:
+        if not boxes:
             return np.empty(0), np.empty((0, len(q)))
-        p = np.concatenate(on_finger)
-        gap = p - np.concatenate(on_box)
-        length = np.linalg.norm(gap, axis=1)
+        joints = self.joints(q[None])[0]
+        a, along = joints[:-1], np.diff(joints, axis=0)
+        corners = np.array([box.corners for box in boxes])
+        # Ends of phalanges, (boxes, joints), and points of phalanges nearest to corners, (boxes, links, corners).
+        ends = np.broadcast_to(joints, (len(boxes), *joints.shape))
+        from_a = corners[:, None] - a[:, None]
+        share = np.einsum("blcx,lx->blc", from_a, along) / np.sum(along**2, axis=1)[:, None]
+        sides = a[:, None] + np.clip(share, 0, 1)[..., None] * along[:, None]
+        nearest = np.array([box.nearest(joints) for box in boxes])
+        p = np.concatenate([ends.reshape(-1, 2), sides.reshape(-1, 2)])
+        gap = np.concatenate([(ends - nearest).reshape(-1, 2), (sides - corners[:, None]).reshape(-1, 2)])
+        length = np.sqrt(np.sum(gap**2, axis=1))
         normal = np.divide(gap, length[:, None], out=np.zeros_like(gap), where=length[:, None] > 0)
-        # J(p): joint i turns everything beyond it clockwise, (x, y) -> (y, -x).
-        arm = p[:, None] - joints[None, :-1]
-        moves = np.arange(len(q)) <= np.array(link)[:, None]
-        jacobian = moves[..., None] * np.stack([arm[..., 1], -arm[..., 0]], axis=-1)
-        return length - np.array(reach), np.einsum("mij,mj->mi", jacobian, normal)
+        # J(p): joint i turns everything beyond it clockwise, (x, y) -> (y, -x); the end of link i is joint i + 1.
+        last = np.concatenate(
+            [
+                np.tile(np.arange(len(joints)) - 1, len(boxes)),
+                np.tile(np.repeat(np.arange(len(a)), 4), len(boxes)),
+            ]
+        )
+        arm = p[:, None] - a
+        turned = normal[:, None, 0] * arm[..., 1] - normal[:, None, 1] * arm[..., 0]
+        rows = np.where(np.arange(len(q)) <= last[:, None], turned, 0.0)
+        rounding = np.array([box.rounding for box in boxes])
+        reach = self.radius + np.concatenate(
+            [np.repeat(rounding, len(joints)), np.repeat(rounding, 4 * len(a))]
+        )
+        return length - reach, rows
+
+    def outlines(self, q: ArrayLike) -> Array:
+        """Outlines (3, M, 2) in metres of the phalanges at posture q (3,), as thick as they are, for drawing."""
+        joints = self.joints(np.atleast_2d(q))[0]
+        shapes = []
+        for a, b in pairwise(joints):
+            heading = np.arctan2(*(b - a)[::-1])
+            half = heading + np.linspace(-np.pi / 2, np.pi / 2, 17)
+            cap = self.radius * np.stack([np.cos(half), np.sin(half)], axis=1)
+            shapes.append(np.concatenate([b + cap, a - cap]))
+        return np.array(shapes)
 
     def _postures(self, Q: ArrayLike) -> Array:
         Q = np.asarray(Q, dtype=np.float64)

@@ -34,7 +34,13 @@ class Rollout:
 
 
 def rollout(
-    policy: Any, start: ArrayLike, steps: int, dt: float, constraint: Constraint | None = None
+    policy: Any,
+    start: ArrayLike,
+    steps: int,
+    dt: float,
+    constraint: Constraint | None = None,
+    *,
+    stop_when: Callable[[Array], ArrayLike] | None = None,
 ) -> Rollout:
     """Integrate a policy whose actions are velocities of its state: ``x_{k+1} = x_k + dt N(x_k) π(x_k)``.
 
@@ -52,6 +58,9 @@ def rollout(
         Rows ``A`` with ``A u = 0``, the same at every state; or a function that is given the current states
         (S, n) and returns the rows at each, (S, k, n), or (k, n) where all share them. Without it the
         policy moves freely.
+    stop_when : callable, optional
+        Is given the current states (S, n); where it says true for any of them the movement ends, with fewer steps.
+        `uncertainty.Unsure` ends it where the policy is not known.
 
     Raises
     ------
@@ -81,6 +90,9 @@ def rollout(
     # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(steps):
+            if stop_when is not None and np.any(stop_when(x)):
+                states, actions = states[:, : k + 1], actions[:, :k]
+                break
             u = _actions(predict, x)
             N = _projection(constraint(x), x.shape) if callable(constraint) else fixed
             if N is not None:
@@ -93,7 +105,7 @@ def rollout(
                 )
             actions[:, k] = u
             states[:, k + 1] = x
-    time = np.linspace(0.0, steps * dt, steps + 1)
+    time = np.linspace(0.0, actions.shape[1] * dt, actions.shape[1] + 1)
     return Rollout(states[0], actions[0], time) if single else Rollout(states, actions, time)
 
 

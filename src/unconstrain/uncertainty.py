@@ -19,6 +19,7 @@ second moment however they depend on each other; where neighbours disagree, that
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -28,6 +29,7 @@ from unconstrain.accumulation import distinct_products
 from unconstrain.features import FullFeatures, PolicyFeatures
 from unconstrain.features.centers import normalized_activations
 from unconstrain.moments import Moments
+from unconstrain.validation import check_number
 
 # Where λ is searched, relative to the largest eigenvalue of H, and at how many values before the search is refined.
 SMALLEST, LARGEST, N_TRIED = 1e-14, 1e6, 41
@@ -111,6 +113,32 @@ class _Evidence:
         )
         # An evidence that only falls, or only grows, has no minimum inside: then the grid's end is kept.
         return np.exp(np.where(found.success, found.x, tried[best, self.every]))
+
+
+class Unsure:
+    """Where a policy is not known well enough to follow it: `rollout(..., stop_when=Unsure(policy, 0.5))`.
+
+    policy: fitted. share: of the predicted speed, that the standard deviation (the root of the summed variances of all
+        actions) may not exceed.
+    """
+
+    def __init__(self, policy: Any, share: float):
+        self.policy = policy
+        self.share = check_number(share, "the share of the speed", positive=True)
+        self.posterior = policy.posterior()
+
+    def __call__(self, X: np.ndarray) -> np.ndarray:
+        """A mask (N,) of states X (N, n)."""
+        deviation, speed = self.measure(X)
+        return deviation > self.share * speed
+
+    def measure(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviation and predicted speed at states X (N, n), each (N,), in units of the action."""
+        P = np.reshape(self.policy.predict(X), (len(X), -1))
+        variance = np.einsum(
+            "njj->n", self.policy._deviation(np.asarray(X, dtype=np.float64), P, self.posterior)
+        )
+        return np.sqrt(np.maximum(variance, 0.0)), np.linalg.norm(P, axis=1)
 
 
 def parametric_covariance(

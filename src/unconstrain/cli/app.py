@@ -8,11 +8,15 @@ from rich.console import Console
 
 import unconstrain
 from unconstrain.cli.demo import demo
+from unconstrain.cli.diagnose import diagnose
 from unconstrain.cli.evaluate import evaluate
 from unconstrain.cli.fit import fit
 from unconstrain.cli.reproduce import reproduce
 from unconstrain.cli.rollout import rollout
+from unconstrain.cli.view import view
 from unconstrain.errors import UnconstrainError
+
+INTERRUPTED = 130
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -38,7 +42,7 @@ def program(
     """Learn the policy behind constrained demonstrations."""
 
 
-for command in (demo, fit, evaluate, rollout, reproduce):
+for command in (demo, fit, evaluate, diagnose, rollout, reproduce, view):
     app.command()(command)
 
 
@@ -51,9 +55,10 @@ def main() -> None:
             f"[bold red]error:[/] {_plain(str(error))}", soft_wrap=True, highlight=False
         )
         sys.exit(2)
-    except KeyboardInterrupt:
-        print("interrupted: nothing was left half written", file=sys.stderr)
-        sys.exit(130)
+    except SystemExit as end:
+        if end.code == INTERRUPTED:  # typer turns Ctrl-C into this without a word
+            print("interrupted: nothing was left half written", file=sys.stderr)
+        raise
     except BrokenPipeError:
         sys.exit(1)
 

@@ -27,8 +27,12 @@ from unconstrain.cli.recordings import TimeUnit as Unit
 from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
+from unconstrain.identifiability import identifiability
 from unconstrain.policies.base import Policy
 from unconstrain.validation import check_choice
+
+WORTH_A_WARNING = 0.1
+"""Share of the policy that recordings leave undetermined."""
 
 BLOCKS = 5
 FOLDS = ("episodes", "blocks")
@@ -118,6 +122,13 @@ def fit(
         f"λ: {policy.alpha_:.3g}" + (" (chosen by cross-validation)" if policy.alpha == "cv" else "")
     )
     _report(console, table, policy.risk)
+    undetermined = 1.0 - identifiability(policy, demos.states, demos.actions).determined_share
+    if undetermined >= WORTH_A_WARNING:
+        console.print(
+            f"warning: {undetermined:.0%} of the policy is not determined by these recordings; `unconstrain diagnose` "
+            "says where, and what to record next",
+            soft_wrap=True,
+        )
     if figure is not None:
         figures.save(figures.learned_field(demos, policy), figure)
         console.print(f"figure: {figure}")

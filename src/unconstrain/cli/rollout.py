@@ -15,6 +15,7 @@ from unconstrain.errors import DataError
 from unconstrain.policies import load_policy
 from unconstrain.rollout import Rollout
 from unconstrain.rollout import rollout as integrate
+from unconstrain.uncertainty import Unsure
 
 
 def rollout(
@@ -33,6 +34,13 @@ def rollout(
     out: Annotated[Path, typer.Option("--out", help="Where the movement is written (CSV).")] = Path(
         "rollout.csv"
     ),
+    stop_when_unsure: Annotated[
+        float | None,
+        typer.Option(
+            "--stop-when-unsure",
+            help="End where the policy's standard deviation exceeds this share of its speed: 0.5, say.",
+        ),
+    ] = None,
     figure: Annotated[Path, typer.Option("--figure", help="Where it is drawn (PNG, SVG, PDF).")] = Path(
         "rollout.png"
     ),
@@ -42,7 +50,15 @@ def rollout(
     figures.check_suffix(figure)
     learnt = load_policy(policy)
     rows = np.array([_numbers(row, "--block", learnt.n_actions_) for row in block]) if block else None
-    movement = integrate(learnt, _numbers(start, "--start", learnt.n_features_in_), steps, dt, rows)
+    unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
+    begin = _numbers(start, "--start", learnt.n_features_in_)
+    movement = integrate(learnt, begin, steps, dt, rows, stop_when=unsure)
+    taken = len(movement.actions)
+    if unsure is not None and taken == 0:
+        raise DataError(
+            f"at the start already {_unsure_at(unsure, movement.states[0])}: start nearer to the recordings, or give a "
+            "larger share to --stop-when-unsure"
+        )
 
     names = _names(learnt)
     columns = {"t": movement.time[:-1]}
@@ -53,8 +69,15 @@ def rollout(
     figures.save(_drawn(movement, names), figure)
     console = reporting.console()
     end = ", ".join(f"{name} {value:.4g}" for name, value in zip(names, movement.states[-1], strict=True))
-    console.print(f"after {steps * dt:g} s: {end}")
+    console.print(f"after {taken * dt:g} s: {end}")
+    if unsure is not None and taken < steps:
+        console.print(f"stopped after {taken} of {steps} steps: {_unsure_at(unsure, movement.states[-1])}")
     console.print(f"movement: {out}\nfigure: {figure}")
+
+
+def _unsure_at(unsure: Unsure, state: np.ndarray) -> str:
+    deviation, speed = unsure.measure(state[None])
+    return f"the policy is known to within ±{deviation[0]:.3g} only, more than {unsure.share:g} of its speed {speed[0]:.3g}"
 
 
 def _numbers(text: str, option: str, wanted: int) -> np.ndarray:

@@ -16,7 +16,7 @@ def described(
     report: "Identifiability", state_names: Sequence[str], action_names: Sequence[str], k: int
 ) -> str:
     """Shares, bounds, the worst regions, the episodes and the next recordings, a line each."""
-    lines = repr(report).splitlines()
+    lines = [*repr(report).splitlines(), "  (for a policy that the model can represent, recorded without noise)"]
     lines += ["", "least known:"]
     for region in report.worst_regions(k):
         lines.append(
@@ -31,7 +31,7 @@ def described(
         lines.append(
             f"  {i}. Start at {place(one.state, state_names)} and leave motion along "
             f"{direction(one.direction, action_names)} free: the policy is known there to within ±{one.deviation:.3g}, "
-            f"and {one.gain:.1%} of the expected squared error would go."
+            f"and {one.gain:.1%} of the expected squared error left by then would go."
         )
     return "\n".join(lines)
 

@@ -1,0 +1,98 @@
+"""`unconstrain diagnose`: what recordings cannot tell, before the robot moves."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from unconstrain import figures
+from unconstrain.cli import models, recordings, reporting
+from unconstrain.cli.fit import Alpha, Centers, Folds, NCenters, Width, describe, folds_of
+from unconstrain.cli.recordings import (
+    Action,
+    Episode,
+    Files,
+    Gap,
+    MaxSpeed,
+    MinDuration,
+    MinSpeed,
+    State,
+    Time,
+    Window,
+)
+from unconstrain.cli.recordings import TimeUnit as Unit
+from unconstrain.errors import PolicyError
+from unconstrain.identifiability import identifiability
+from unconstrain.identifiability.pictures import drawn
+from unconstrain.identifiability.spectrum import THRESHOLD
+from unconstrain.validation import check_choice
+
+CHOICES = tuple(name for name in models.MODELS if name != "auto")
+
+
+def diagnose(
+    files: Files,
+    state: State = None,
+    action: Action = None,
+    time: Time = None,
+    episode: Episode = None,
+    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(CHOICES)}.")] = "locally-linear",
+    alpha: Alpha = "cv",
+    centers: Centers = None,
+    n_centers: NCenters = None,
+    width: Width = None,
+    folds: Folds = None,
+    k: Annotated[
+        int, typer.Option("--most", "-k", min=1, help="How many regions and recordings to name.")
+    ] = 3,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="A direction of which less was seen is undetermined.")
+    ] = THRESHOLD,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="Draw how far the policy is determined (PNG, SVG, PDF).")
+    ] = None,
+    time_unit: Unit = None,
+    window: Window = None,
+    gap: Gap = None,
+    max_speed: MaxSpeed = None,
+    min_speed: MinSpeed = None,
+    min_duration: MinDuration = None,
+) -> None:
+    """Say how far recordings determine the policy, where they do not, and what to record next.
+
+    `unconstrain diagnose wipe.csv --state x,y,z --time t --episode run --model locally-linear`
+    """
+    recordings.check_writable(figure)
+    figures.check_suffix(figure)
+    check_choice(model, "--model", models.MODELS)
+    if model == "auto":
+        raise PolicyError(f"diagnose is about one model: choose --model {' or '.join(CHOICES)}")
+    how = recordings.asked(
+        state,
+        action,
+        time,
+        episode,
+        time_unit=time_unit,
+        window=window,
+        gap=gap,
+        max_speed=max_speed,
+        min_speed=min_speed,
+        min_duration=min_duration,
+    )
+    policy = models.build(model, alpha=models.decay(alpha), centers=centers, n_centers=n_centers, width=width)
+    console = reporting.console()
+    with console.status("reading"):
+        demos = recordings.read(files, how)
+    describe(console, demos)
+    with console.status("fitting"):
+        policy.fit(demos.states, demos.actions, groups=folds_of(demos, folds))
+    with console.status("diagnosing"):
+        labels = [demos.episode_labels[code] for code in demos.episodes]
+        report = identifiability(policy, demos.states, demos.actions, groups=labels, threshold=threshold)
+        text = report.describe(demos.state_names, demos.action_names, k)
+    console.print(text, markup=False)
+    if report.n_silent:
+        console.print(f"{report.n_silent} samples do not move, and say nothing")
+    if figure is not None:
+        figures.save(drawn(report, demos.state_names), figure)
+        console.print(f"figure: {figure}")

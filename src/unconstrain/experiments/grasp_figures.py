@@ -142,8 +142,14 @@ def unconstrained_reaching(
         ax.set(xlabel=f"{'xyz'[i]} / m", ylabel=f"{'xyz'[j]} / m", title=title)
         ax.set_aspect("equal", adjustable="datalim")
         ax.grid(alpha=0.25)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=9)
+    shown = {
+        label: handle
+        for ax in figure.axes
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        shown.values(), shown, loc="outside lower center", ncols=len(shown), frameon=False, fontsize=9
+    )
     return figure
 
 

@@ -81,14 +81,21 @@ def local_moments(
     return Moments(H, g[:, :, None].copy(), squares, weight, len(X))
 
 
-def distinct_products(A: np.ndarray) -> np.ndarray:
-    """Products a_i a_j, i <= j, of the columns of A (N, k): rows in the order of the upper triangle, (k(k+1)/2, N)."""
+def distinct_products(
+    A: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
+) -> np.ndarray:
+    """Products ω a_i a_j, i <= j, of the columns of A (N, k), weighted (N,): (k(k+1)/2, N).
+
+    Rows are in the order of the upper triangle; `out` may hold them.
+    """
     k = A.shape[1]
     T = np.ascontiguousarray(A.T)
-    products = np.empty((_pairs(k), len(A)))
+    # k products, where weighing what comes out would be k(k+1)/2.
+    weighted = T if weights is None else T * weights
+    products = np.empty((_pairs(k), len(A))) if out is None else out
     row = 0
     for i in range(k):
-        np.multiply(T[i], T[i:], out=products[row : row + k - i])
+        np.multiply(weighted[i], T[i:], out=products[row : row + k - i])
         row += k - i
     return products
 
@@ -98,14 +105,15 @@ def _product_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights
 
     def add(block: slice, totals: Totals) -> None:
         B, part, omega = features.basis(X[block]), seen[block], weights[block]
-        totals[0] += distinct_products(B) @ (_seen_products(part) * omega).T
-        totals[1] += (_pull(part) * omega[:, None]).T @ B
+        space_b, space_q = (space[:, : len(B)] for space in totals[3:])
+        totals[0] += distinct_products(B, out=space_b) @ _seen_products(part, omega, space_q).T
+        totals[1] += (_pull(part).T * omega) @ B
         totals[2] += part.squares @ omega
 
-    shapes = [(_pairs(M), _pairs(d)), (d, M), ()]
-    products, g, squares = _sum_over_blocks(
-        len(X), _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d)), shapes, add
-    )
+    rows = _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d))
+    # The last two are no totals but each thread's working space, as for local models.
+    shapes = [(_pairs(M), _pairs(d)), (d, M), (), (_pairs(M), rows), (_pairs(d), rows)]
+    products, g, squares, *_ = _sum_over_blocks(len(X), rows, shapes, add)
     return Moments(_unfold(products, M, d), g.reshape(-1, 1), squares, np.sum(weights), len(X))
 
 
@@ -159,16 +167,21 @@ def _rows(numbers: int, width: int) -> int:
     return max(256, min(numbers // width, 8192))
 
 
-def _seen_products(seen: Sight) -> np.ndarray:
-    """The distinct entries of `QᵀQ`, (d(d+1)/2, N)."""
+def _seen_products(
+    seen: Sight, weights: np.ndarray | None = None, out: np.ndarray | None = None
+) -> np.ndarray:
+    """The distinct entries of `ω QᵀQ`, (d(d+1)/2, N), for weights (N,); `out` may hold them."""
     if seen.rows.shape[1] == 1:
-        return distinct_products(seen.rows[:, 0])
+        return distinct_products(seen.rows[:, 0], weights, out)
     i, j = np.triu_indices(seen.n_actions)
-    return np.einsum("nki,nkj->nij", seen.rows, seen.rows)[:, i, j].T
+    products = np.einsum("nki,nkj->nij", seen.rows, seen.rows)[:, i, j].T
+    return products if weights is None else products * weights
 
 
 def _pull(seen: Sight) -> np.ndarray:
     """`QᵀQ u`, (N, d)."""
+    if seen.rows.shape[1] == 1:
+        return seen.rows[:, 0] * seen.targets
     return np.einsum("nki,nk->ni", seen.rows, seen.targets)
 
 
@@ -192,4 +205,4 @@ def _pair_index(k: int) -> np.ndarray:
 
 
 def _with_one(X: np.ndarray) -> np.ndarray:
-    return np.column_stack([X, np.ones(len(X))])
+    return np.vstack([X.T, np.ones(len(X))]).T  # a row a feature, as their products are

@@ -43,15 +43,20 @@ def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
 
     `scale` is the longest action's length, in the action's unit, where it is known from elsewhere.
     """
-    lengths = np.linalg.norm(U, axis=1)
+    lengths = _lengths(U)
     return lengths > NO_MOTION * (lengths.max(initial=0.0) if scale is None else scale)
 
 
 def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Directions `û` (N, d) and lengths `r` (N,) of actions U (N, d); both zero where an action is zero."""
-    lengths = np.where(moving(U), np.linalg.norm(U, axis=1), 0.0)
+    lengths = _lengths(U)
+    lengths[lengths <= NO_MOTION * lengths.max(initial=0.0)] = 0.0
     inverse = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0)
     return U * inverse[:, None], lengths
+
+
+def _lengths(U: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("nd,nd->n", U, U))
 
 
 @dataclass(frozen=True)

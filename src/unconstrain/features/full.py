@@ -44,7 +44,8 @@ class FullFeatures(BaseEstimator):
     def basis(self, X: np.ndarray) -> np.ndarray:
         """`b(x)` at states X (N, n): an array (N, M)."""
         if self.transformer_ is None:
-            return np.column_stack([X, np.ones(len(X))])
+            # Stored a row a feature, which is how their products are formed.
+            return np.vstack([X.T, np.ones(len(X))]).T
         B = self.transformer_.transform(X)
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 

@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits
+from benchmarks import fits, identifiability, stream
 from benchmarks.ratio import Ratio
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
@@ -31,6 +31,13 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "lambda-path-local": fits.lambda_path_local,
     "loop": fits.loop,
     "growth": fits.growth,
+    "report": identifiability.report,
+    "report-of-moments": identifiability.report_of_moments,
+    "deviations": identifiability.deviations,
+    "stream-linear": stream.linear,
+    "stream-local": stream.local,
+    "stream-linear-memory": stream.linear_memory,
+    "stream-local-memory": stream.local_memory,
 }
 
 

@@ -285,6 +285,7 @@ def _choices(demonstrator: Demonstrator) -> tuple[str, ...]:
         "Recorded velocity is J q̇ of the joint velocities that mink found, at the recorded position.",
         f"Local models: {N_MODELS} centres by k-means, σ 1.5 times their mean spacing; λ among 25 values by "
         "inconsistency held out in five folds of movements (for the direct approach by its own risk).",
+        f"Potential: a polynomial of degree {POTENTIAL_DEGREE} (--model potential; a candidate of --model auto).",
     )
 
 

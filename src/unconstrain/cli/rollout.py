@@ -77,7 +77,10 @@ def rollout(
 
 def _unsure_at(unsure: Unsure, state: np.ndarray) -> str:
     deviation, speed = unsure.measure(state[None])
-    return f"the policy is known to within ±{deviation[0]:.3g} only, more than {unsure.share:g} of its speed {speed[0]:.3g}"
+    known = f"±{deviation[0]:.3g}"
+    return (
+        f"the policy is known to within {known} only, more than {unsure.share:g} of its speed, {speed[0]:.3g}"
+    )
 
 
 def _numbers(text: str, option: str, wanted: int) -> np.ndarray:

@@ -43,14 +43,16 @@ def drawn(report: Identifiability, state_names) -> Figure:
             )
             ax.set(xlabel=state_names[i], ylabel="standard deviation" if n == 1 else state_names[j])
         panels[0].set_title("largest standard deviation of the policy", fontsize=10.5)
-        figure.colorbar(points, ax=panels, label="units of the action")
+        figure.colorbar(points, ax=panels, label="units of the action", format="%.2g")
     values = report.spectrum
     last.plot(
         np.maximum(values[::-1], 1e-8), np.arange(1, len(values) + 1) / len(values), color=figures.LEARNT
     )
     last.axvline(report.threshold, color=figures.TRUE, ls="--", lw=1)
     last.set_xscale("log")
-    last.set(xlabel="share of a direction that was seen", ylabel="share of directions seen at least so far")
+    last.set(
+        xlabel="share of a direction that was seen", ylabel="share of directions seen at least that much"
+    )
     last.set_title(f"determined: {report.determined_share:.1%}", fontsize=10.5)
     last.set_ylim(0, 1.02)
     last.grid(alpha=0.3)
@@ -73,7 +75,7 @@ def determination(ax: Axes, report: Identifiability, low, high, *, levels=None) 
     shown = ax.contourf(x, y, values, levels, norm="log", cmap="viridis")
     decades = 10.0 ** np.arange(np.ceil(np.log10(levels[0])), np.floor(np.log10(levels[-1])) + 1)
     ax.figure.colorbar(
-        shown, ax=ax, label="units of the action", format="%g", ticks=decades if len(decades) > 1 else None
+        shown, ax=ax, label="units of the action", format="%.2g", ticks=decades if len(decades) > 1 else None
     )
     near = report.recordings
     if near is not None:

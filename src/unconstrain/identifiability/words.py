@@ -16,7 +16,10 @@ def described(
     report: "Identifiability", state_names: Sequence[str], action_names: Sequence[str], k: int
 ) -> str:
     """Shares, bounds, the worst regions, the episodes and the next recordings, a line each."""
-    lines = [*repr(report).splitlines(), "  (for a policy that the model can represent, recorded without noise)"]
+    lines = [
+        *repr(report).splitlines(),
+        "  (for a policy that the model can represent, recorded without noise)",
+    ]
     lines += ["", "least known:"]
     for region in report.worst_regions(k):
         lines.append(

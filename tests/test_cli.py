@@ -1,4 +1,5 @@
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -44,14 +45,15 @@ COLUMNS = ("--state", "x1,x2", "--action", "u1,u2", "--episode", "episode")
 
 
 def test_demo_ends_with_a_command_that_works(run, tmp_path):
-    code, out, _ = run("demo", "--out", "demo")
+    folder = tmp_path / "a [demo] of mine"
+    code, out, _ = run("demo", "--out", folder.name)
     assert code == 0
-    assert {p.name for p in (tmp_path / "demo").iterdir()} == {"limit-cycle.png", "table.md", "movements.csv"}
-    last = out.strip().splitlines()[-1].split()
+    assert {p.name for p in folder.iterdir()} == {"limit-cycle.png", "table.md", "movements.csv"}
+    last = shlex.split(out.strip().splitlines()[-1])
     assert last[0] == "unconstrain"
     code, out, _ = run(*last[1:])
     assert code == 0
-    assert uc.load_policy("demo/policy.skops").score([[0.5, 0.5]], [[0.5, -0.5]]) > 0.9
+    assert uc.load_policy(folder / "policy.skops").score([[0.5, 0.5]], [[0.5, -0.5]]) > 0.9
 
 
 def test_fit_evaluate_rollout(run, movements, tmp_path):
@@ -113,6 +115,9 @@ def test_states_alone_are_differentiated(run, movements):
         (["fit", "DATA", *COLUMNS, "--model", "forest"], "--model must be one of"),
         (["fit", "DATA", *COLUMNS, "--model", "linear", "--width", "1"], "no centres"),
         (["fit", "DATA", *COLUMNS, "--alpha", "some"], "--alpha must be"),
+        (["fit", "DATA", *COLUMNS, "--alpha", "-1"], "--alpha must be a finite number of at least zero"),
+        (["fit", "DATA", *COLUMNS, "--n-centers", "0"], "error: n_centers must be a whole number"),
+        (["fit", "DATA", *COLUMNS[:-2], "--folds", "episodes"], "use --folds blocks"),
         (["fit", "DATA", *COLUMNS, "--folds", "halves"], "--folds must be one of"),
         (["fit", "DATA", *COLUMNS, "--risk", "constrained"], "--risk must be one of"),
         (["fit", "DATA", *COLUMNS, "--out", "nowhere/p.skops"], "there is no folder nowhere"),
@@ -178,6 +183,7 @@ def test_ctrl_c_ends_with_one_line_and_leaves_nothing_half_written(movements, tm
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
+    assert err.strip().splitlines()[-1] == "interrupted: nothing was left half written"
     assert "Traceback" not in err
     assert {p.name for p in tmp_path.iterdir()} == {movements.name, "big.csv"}
 

@@ -157,3 +157,101 @@ def test_mistakes_are_told_in_one_sentence(call, sentence):
     with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def test_constraints_are_saved_and_loaded(tmp_path):
+    rng = np.random.default_rng(5)
+    X, U = constrained_plane(rng)
+    for estimator in (uc.ConstantConstraint(), uc.FeatureConstraint(uc.NormalizedRBF(5))):
+        estimator.fit(X, U).save(tmp_path / "c.skops")
+        np.testing.assert_array_equal(
+            uc.load_constraint(tmp_path / "c.skops").predict(X), estimator.predict(X)
+        )
+    uc.ParametricPolicy().fit(X, U).save(tmp_path / "p.skops")
+    with pytest.raises(uc.errors.PolicyFileError, match="holds a ParametricPolicy, not a constraint"):
+        uc.load_constraint(tmp_path / "p.skops")
+
+
+def constrained_plane(rng):
+    X = rng.uniform(-1, 1, (200, 3))
+    _, U = constrained(
+        np.broadcast_to([[0.0, 0.6, 0.8]], (200, 1, 3)), np.cos(3 * X) + rng.normal(size=X.shape)
+    )
+    return X, U
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    """A recording on a tilted table, with forces and flags, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    X, U = constrained_plane(np.random.default_rng(6))
+    forces = np.where(np.arange(200)[:, None] < 150, [[0.0, 3.0, 4.0]], 0.0)
+    free = (np.arange(200) >= 150)[:, None]
+    names = "x,y,z,vx,vy,vz,fx,fy,fz,free"
+    np.savetxt("table.csv", np.hstack([X, U, forces, free]), delimiter=",", header=names, comments="")
+    np.savetxt("any.csv", np.hstack([X, np.random.default_rng(7).normal(size=X.shape), forces, free]), delimiter=",",
+               header=names, comments="")  # fmt: skip
+    return ["--state", "x,y,z", "--action", "vx,vy,vz"]
+
+
+def program(monkeypatch, capsys, *arguments):
+    from unconstrain.cli import main
+
+    monkeypatch.setattr("sys.argv", ["unconstrain", *map(str, arguments)])
+    try:
+        main()
+        code = 0
+    except SystemExit as end:
+        code = end.code or 0
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_the_command_prints_saves_and_draws_the_constraint(table, monkeypatch, capsys, tmp_path):
+    code, out, _ = program(
+        monkeypatch, capsys, "constraints", "table.csv", *table, "--out", "c.skops", "--figure", "c.png"
+    )
+    assert code == 0
+    assert "0.800 vz + 0.600 vy ≈ 0" in out
+    assert "1 of 3 directions" in out
+    assert (tmp_path / "c.png").stat().st_size > 0
+    assert uc.load_constraint("c.skops").n_constraints_ == 1
+    code, out, _ = program(monkeypatch, capsys, "constraints", "table.csv", *table, "--model", "rbf")
+    assert code == 0
+    assert "0.800 vz + 0.600 vy ≈ 0" in out
+
+
+def test_fit_takes_forces_and_flags(table, monkeypatch, capsys):
+    forces = ["--force", "fx,fy,fz", "--force-threshold", "2"]
+    code, out, _ = program(monkeypatch, capsys, "fit", "table.csv", *table, "--model", "linear", *forces)
+    assert code == 0
+    assert "75.0% in contact, 25.0% free" in out
+    assert uc.load_policy("policy.skops").risk == "auto"
+    code, out, _ = program(
+        monkeypatch, capsys, "fit", "table.csv", *table, "--model", "linear", "--free", "free"
+    )
+    assert "known of 25.0%" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["constraints", "any.csv"], "the actions span all 3 directions"),
+        (["constraints", "table.csv", "--rows", "3"], "whole number from 1 to 2"),
+        (["constraints", "table.csv", "--n-centers", "3"], "--n-centers is for --model rbf"),
+        (
+            ["fit", "table.csv", "--force", "fx,fy", "--force-threshold", "2"],
+            "forces have 2 components and actions 3",
+        ),
+        (["fit", "table.csv", "--force", "fx,fy,fz"], "--force needs --force-threshold"),
+        (["fit", "table.csv", "--force-threshold", "2"], "--force-threshold is for forces"),
+    ],
+)
+def test_mistakes_on_the_command_line_are_one_sentence(
+    table, monkeypatch, capsys, tmp_path, arguments, sentence
+):
+    code, _, err = program(monkeypatch, capsys, *arguments, *table)
+    assert code == 2
+    assert sentence in err
+    assert "Traceback" not in err
+    assert not list(tmp_path.glob("*.skops"))

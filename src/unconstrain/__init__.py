@@ -18,6 +18,7 @@ from unconstrain.learnt_constraints import (
     ConstraintChain,
     FeatureConstraint,
     NullspaceComponent,
+    load_constraint,
 )
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
 from unconstrain.readers import load, save
@@ -44,6 +45,7 @@ __all__ = [
     "identifiability",
     "load",
     "load_compiled",
+    "load_constraint",
     "load_policy",
     "moments",
     "risk",

@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 import unconstrain
+from unconstrain.cli.constraints import constraints
 from unconstrain.cli.demo import demo
 from unconstrain.cli.diagnose import diagnose
 from unconstrain.cli.evaluate import evaluate
@@ -42,7 +43,7 @@ def program(
     """Learn the policy behind constrained demonstrations."""
 
 
-for command in (demo, fit, evaluate, diagnose, rollout, reproduce, view):
+for command in (demo, fit, evaluate, diagnose, constraints, rollout, reproduce, view):
     app.command()(command)
 
 

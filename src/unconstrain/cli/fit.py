@@ -25,6 +25,7 @@ from unconstrain.cli.recordings import (
 )
 from unconstrain.cli.recordings import TimeUnit as Unit
 from unconstrain.cli.reporting import quoted
+from unconstrain.constraints import from_recording
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.identifiability import identifiability
@@ -54,6 +55,17 @@ Folds = Annotated[
         "--folds", help="What is held out: whole episodes, or blocks of each. Default: episodes, if several."
     ),
 ]
+Force = Annotated[
+    str | None,
+    typer.Option("--force", help="Columns of the contact force, one for each action.", metavar="fx,fy,fz"),
+]
+ForceThreshold = Annotated[
+    float | None, typer.Option("--force-threshold", help="A force above this is a contact, in its own unit.")
+]
+Free = Annotated[
+    str | None,
+    typer.Option("--free", help="Column with 1 where nothing constrained the motion.", metavar="COLUMN"),
+]
 Figure = Annotated[
     Path | None, typer.Option("--figure", help="Draw recorded movement and learnt policy (PNG, SVG, PDF).")
 ]
@@ -74,6 +86,9 @@ def fit(
     n_centers: NCenters = None,
     width: Width = None,
     folds: Folds = None,
+    force: Force = None,
+    force_threshold: ForceThreshold = None,
+    free: Free = None,
     time_unit: Unit = None,
     window: Window = None,
     gap: Gap = None,
@@ -91,6 +106,7 @@ def fit(
     check_choice(risk, "--risk", ("inconsistency", "direct"))
     if folds is not None:
         check_choice(folds, "--folds", FOLDS)
+    _check_known(force, force_threshold, free, risk)
     how = recordings.asked(
         state,
         action,
@@ -108,11 +124,19 @@ def fit(
     )
     console = reporting.console()
     with console.status("reading"):
-        demos = recordings.read(files, how)
+        felt = {"force": recordings.columns(force), "free": recordings.one_column(free, "--free")}
+        demos = recordings.read(
+            files, how | {name: given for name, given in felt.items() if given is not None}
+        )
     describe(console, demos)
     groups = folds_of(demos, folds)
+    known = None
+    if force is not None or free is not None:
+        known, risk = from_recording(demos, force_threshold=force_threshold), "auto"
+        _describe_known(console, known)
+        named = named and {name: clone(policy).set_params(risk=risk) for name, policy in named.items()}
 
-    chosen, table = _compare(console, demos, groups, model, named, risk)
+    chosen, table = _compare(console, demos, groups, model, named, risk, known)
     policy = table.policies[chosen]
     policy.recording_ = how
     console.print(
@@ -122,7 +146,9 @@ def fit(
         f"λ: {policy.alpha_:.3g}" + (" (chosen by cross-validation)" if policy.alpha == "cv" else "")
     )
     _report(console, table, policy.risk)
-    undetermined = 1.0 - identifiability(policy, demos.states, demos.actions).determined_share
+    undetermined = (
+        1.0 - identifiability(policy, demos.states, demos.actions, projections=known).determined_share
+    )
     if undetermined >= WORTH_A_WARNING:
         console.print(
             f"warning: {undetermined:.0%} of the policy is not determined by these recordings; `unconstrain diagnose` "
@@ -174,7 +200,31 @@ def folds_of(demos: Demonstrations, folds: str | None) -> np.ndarray:
     return demos.episodes if folds == "episodes" else demos.blocks(BLOCKS)
 
 
-def _compare(console, demos, groups, model, named, risk) -> tuple[str, comparison.Selection]:
+def _check_known(force: str | None, threshold: float | None, free: str | None, risk: str) -> None:
+    if force is not None and threshold is None:
+        raise DataError(
+            "--force needs --force-threshold, above which a force is a contact, in the forces' unit"
+        )
+    if threshold is not None and force is None:
+        raise DataError("--force-threshold is for forces: name their columns with --force")
+    if risk == "direct" and (force is not None or free is not None):
+        raise PolicyError(
+            "ordinary regression makes no use of constraints: leave out --risk direct, or --force and --free"
+        )
+
+
+def _describe_known(console: Console, N: np.ndarray) -> None:
+    """Say of how many samples the constraint is known."""
+    unknown = np.isnan(N).any(axis=(1, 2))
+    identity = np.eye(N.shape[1])
+    free = np.isclose(N, identity, rtol=0, atol=0).all(axis=(1, 2))
+    console.print(
+        f"constraints: known of {np.mean(~unknown):.1%} of the samples ({np.mean(~unknown & ~free):.1%} in contact, "
+        f"{np.mean(free):.1%} free), not of {np.mean(unknown):.1%}"
+    )
+
+
+def _compare(console, demos, groups, model, named, risk, known) -> tuple[str, comparison.Selection]:
     """The name of the policy asked for, and the comparison that holds it next to the other risk's."""
     data = (demos.states, demos.actions, groups)
     with console.status("fitting") as status:
@@ -183,15 +233,15 @@ def _compare(console, demos, groups, model, named, risk) -> tuple[str, compariso
             status.update(f"fitted {row.name} in {row.seconds:.1f} s")
 
         if named is None:
-            found = comparison.select_policy("auto", *data, progress=progress)
+            found = comparison.select_policy("auto", *data, projections=known, progress=progress)
             console.print(str(found.table))
             model, named = found.name, {found.name: found.policy}
-        other = "direct" if risk == "inconsistency" else "inconsistency"
+        other = "inconsistency" if risk in ("direct", "auto") else "direct"
         pair = {
             f"{model}, {risk}": clone(named[model]),
             f"{model}, {other}": clone(named[model]).set_params(risk=other),
         }
-        result = comparison.select_policy(pair, *data, progress=progress)
+        result = comparison.select_policy(pair, *data, projections=known, progress=progress)
     asked = f"{model}, {risk}"
     if result.table[asked].problem:
         raise PolicyError(str(result.table[asked].problem))

@@ -10,9 +10,16 @@ What a person chose not to do looks the same as what could not be done: no metho
 movement repeated over and over is "constrained" in all directions but its own.
 """
 
+from unconstrain.learnt_constraints.base import load_constraint
 from unconstrain.learnt_constraints.chain import ConstraintChain
 from unconstrain.learnt_constraints.component import NullspaceComponent
 from unconstrain.learnt_constraints.constant import ConstantConstraint
 from unconstrain.learnt_constraints.feature import FeatureConstraint
 
-__all__ = ["ConstantConstraint", "ConstraintChain", "FeatureConstraint", "NullspaceComponent"]
+__all__ = [
+    "ConstantConstraint",
+    "ConstraintChain",
+    "FeatureConstraint",
+    "NullspaceComponent",
+    "load_constraint",
+]

@@ -1,13 +1,17 @@
 """What learnt constraints share: rows give projections, and projections a score."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
-from sklearn.base import BaseEstimator
+from sklearn.base import BaseEstimator, clone
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain import risk
-from unconstrain.errors import DataError, PolicyError
+from unconstrain.errors import DataError, PolicyError, PolicyFileError
+from unconstrain.policies import persistence
+from unconstrain.selection import splits
 from unconstrain.validation import check_actions, check_groups, check_samples, check_states
 
 
@@ -16,6 +20,8 @@ class LearntConstraint(BaseEstimator, ABC):
 
     n_constraints_: int
     n_actions_: int
+    shares_: np.ndarray
+    reason_: str
 
     def rows(self, X) -> np.ndarray:
         """Constraint rows A(x) at states X (N, n), orthonormal at each: (N, k, d), with ``A u ≈ 0``.
@@ -41,6 +47,14 @@ class LearntConstraint(BaseEstimator, ABC):
         if motion == 0.0:
             raise DataError("all actions are zero: there is no motion to compare a constraint with")
         return 1.0 - risk.projected_observation_error(actions, self.predict(X)) / motion
+
+    def save(self, path: str | Path) -> None:
+        """Write the constraint to `path` (customarily `.skops`), to be read by `load_constraint`. Holds no pickle.
+
+        A task Jacobian of your own is saved by the name of its function, and has to be importable where it is read.
+        """
+        check_is_fitted(self)
+        persistence.save(self, path)
 
     @abstractmethod
     def _rows(self, X: np.ndarray) -> np.ndarray:
@@ -76,3 +90,27 @@ class LearntConstraint(BaseEstimator, ABC):
                 f"{self.n_actions_}, or None, got {n_constraints!r}"
             )
         return int(n_constraints)
+
+
+def held_out_projections(constraint: LearntConstraint, X: np.ndarray, U: np.ndarray, groups) -> np.ndarray:
+    """Projections (N, d, d) at every sample by copies of `constraint` fitted to the folds it is not in.
+
+    X (N, n), U (N, d), groups (N,): episodes or blocks, held out whole.
+    """
+    N = np.empty((*U.shape, U.shape[1]))
+    for train, test in splits(len(X), groups):
+        N[test] = clone(constraint).fit(X[train], U[train], groups=groups[train]).predict(X[test])
+    return N
+
+
+def load_constraint(path: str | Path, *, trusted: Sequence[str] = ()) -> LearntConstraint:
+    """The constraint that `constraint.save(path)` wrote; all else as for `load_policy`.
+
+    Raises `PolicyFileError` for any other file.
+    """
+    loaded = persistence.load_policy(path, trusted=trusted)
+    if not isinstance(loaded, LearntConstraint):
+        raise PolicyFileError(
+            f"{path} holds a {type(loaded).__name__}, not a constraint: load it with load_policy"
+        )
+    return loaded

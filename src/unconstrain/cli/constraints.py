@@ -1,0 +1,146 @@
+"""`unconstrain constraints`: the directions in which recordings never move, and how sure that is."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from unconstrain import constraint_figures, figures, risk
+from unconstrain.cli import recordings, reporting
+from unconstrain.cli.fit import describe, folds_of
+from unconstrain.cli.recordings import (
+    Action,
+    Episode,
+    Files,
+    Gap,
+    MaxSpeed,
+    MinDuration,
+    MinSpeed,
+    State,
+    Time,
+    Window,
+)
+from unconstrain.cli.recordings import TimeUnit as Unit
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import PolicyError
+from unconstrain.features import NormalizedRBF
+from unconstrain.learnt_constraints import ConstantConstraint, FeatureConstraint
+from unconstrain.learnt_constraints.base import LearntConstraint, held_out_projections
+from unconstrain.validation import check_choice
+
+MODELS = ("constant", "linear", "rbf")
+
+Model = Annotated[
+    str,
+    typer.Option("--model", help="constant; or rows that vary with the state: linear, rbf."),
+]
+Rows = Annotated[
+    int | None, typer.Option("--rows", help="How many rows; by default as the motion tells (constant), or 1.")
+]
+NCenters = Annotated[int | None, typer.Option("--n-centers", help="How many RBFs (10).")]
+Out = Annotated[Path, typer.Option("--out", help="Where the constraint is saved.")]
+Figure = Annotated[
+    Path | None, typer.Option("--figure", help="Draw shares of motion and rows (PNG, SVG, PDF).")
+]
+
+
+def constraints(
+    files: Files,
+    state: State = None,
+    action: Action = None,
+    time: Time = None,
+    episode: Episode = None,
+    model: Model = "constant",
+    rows: Rows = None,
+    n_centers: NCenters = None,
+    out: Out = Path("constraint.skops"),
+    figure: Figure = None,
+    time_unit: Unit = None,
+    window: Window = None,
+    gap: Gap = None,
+    max_speed: MaxSpeed = None,
+    min_speed: MinSpeed = None,
+    min_duration: MinDuration = None,
+) -> None:
+    """Find the constraint that recordings moved under: rows A with A u = 0.
+
+    `unconstrain constraints wipe.csv --state x,y,z --time t --out table.skops`
+    """
+    recordings.check_writable(out, figure)
+    figures.check_suffix(figure)
+    check_choice(model, "--model", MODELS)
+    if n_centers is not None and model != "rbf":
+        raise PolicyError(f"--n-centers is for --model rbf, and this is {model}")
+    how = recordings.asked(
+        state,
+        action,
+        time,
+        episode,
+        time_unit=time_unit,
+        window=window,
+        gap=gap,
+        max_speed=max_speed,
+        min_speed=min_speed,
+        min_duration=min_duration,
+    )
+    estimator = _estimator(model, rows, 10 if n_centers is None else n_centers)
+    console = reporting.console()
+    with console.status("reading"):
+        demos = recordings.read(files, how)
+    describe(console, demos)
+    groups = folds_of(demos, None)
+    with console.status("fitting"):
+        learnt = estimator.fit(demos.states, demos.actions, groups=groups)
+        N = held_out_projections(estimator, demos.states, demos.actions, groups)
+    _report(console, demos, learnt)
+    error = risk.normalized(risk.projected_observation_error(demos.actions, N), demos.actions)
+    console.print(
+        f"motion across the constraint, on what was held out: {error:.2%} of the actions' variance (nPOE)"
+    )
+    if figure is not None:
+        figures.save(constraint_figures.found(demos, learnt), figure)
+        console.print(f"figure: {figure}")
+    learnt.save(out)
+    console.print(f"constraint: {out}")
+
+
+def _estimator(model: str, rows: int | None, n_centers: int) -> LearntConstraint:
+    if model == "constant":
+        return ConstantConstraint(rows)
+    return FeatureConstraint(
+        NormalizedRBF(n_centers) if model == "rbf" else None, 1 if rows is None else rows
+    )
+
+
+def _report(console: Console, demos: Demonstrations, learnt: LearntConstraint) -> None:
+    console.print(f"rows: {learnt.n_constraints_} ({learnt.reason_})")
+    names = demos.action_names
+    A = learnt.rows(demos.states)
+    if isinstance(learnt, ConstantConstraint):
+        for row in A[0]:
+            console.print(f"  {equation(row, names)}")
+        console.print(f"how sure: standard error of the direction {np.degrees(learnt.uncertainty_):.2g}°")
+        return
+    for j in range(A.shape[1]):
+        mean, spread = _middle(A[:, j])
+        console.print(
+            f"  {equation(mean, names)}   on average; it turns by {np.degrees(spread):.0f}° (median)"
+        )
+
+
+def equation(row: np.ndarray, names: tuple[str, ...]) -> str:
+    """A row as the equation it states, its largest term first: `0.85 z - 0.42 x ≈ 0`."""
+    row = row * np.sign(row[np.argmax(np.abs(row))])
+    text = ""
+    for i in np.argsort(-np.abs(row)):
+        if abs(row[i]) >= 0.0005:
+            text += f" {'-' if row[i] < 0 else '+'} {abs(row[i]):.3f} {names[i]}"
+    return text.removeprefix(" + ") + " ≈ 0"
+
+
+def _middle(rows: np.ndarray) -> tuple[np.ndarray, float]:
+    """The direction nearest to unit rows (N, d), whatever their signs, and the median angle to it (rad)."""
+    middle = np.linalg.eigh(rows.T @ rows)[1][:, -1]
+    return middle, float(np.median(np.arccos(np.clip(np.abs(rows @ middle), 0.0, 1.0))))

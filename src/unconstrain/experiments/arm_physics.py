@@ -28,7 +28,7 @@ NAMES = {GRIPPED: "hand gripped (1-2-3)", TABLE: "hand on a table"}
 METHODS = ("direct", "inconsistency", "auto")
 
 FRAMES = (0.0, 0.8, 3.9)
-VIEW = {"distance": 1.65, "azimuth": 140.0, "elevation": -14.0}
+VIEW = {"distance": 1.75, "azimuth": 140.0, "elevation": -14.0}
 """Seconds at which frames are drawn, and from where: metres and degrees."""
 
 SETTINGS = {
@@ -206,7 +206,7 @@ def frame_figure(seed: int = 0) -> Figure:
         )
         demos = recording.demonstrations
         robot = arm_dynamics.staged(recording, scenario, episode=0)
-        middle = 0.6 if scenario == GRIPPED else -0.55
+        middle = 0.6 if scenario == GRIPPED else -0.65
         with Camera(robot.model, 720, 640, at=(0.0, 0.0, middle), **VIEW) as view:
             for ax, second in zip(axes, FRAMES, strict=True):
                 ax.imshow(view.picture(demos.states[round(second * arm_dynamics.RATE)]))

@@ -1,5 +1,7 @@
 """Learnt constraints: exact where the model holds the truth, and honest where there is none to be found."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,12 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 
 import unconstrain as uc
+from unconstrain.experiments import constraints_surfaces, constraints_trials
+from unconstrain.learnt_constraints.base import held_out_projections
 from unconstrain.plants import arm
+from unconstrain.plants.planar import PlanarArm
+
+RECORDINGS = Path(__file__).parents[1] / "../shared/data"
 
 
 def constrained(A, Pi):
@@ -255,3 +262,35 @@ def test_mistakes_on_the_command_line_are_one_sentence(
     assert sentence in err
     assert "Traceback" not in err
     assert not list(tmp_path.glob("*.skops"))
+
+
+def test_planar_arms_move_as_their_jacobian_says():
+    rng = np.random.default_rng(8)
+    plant, Q, dQ = PlanarArm((1.0, 0.7, 0.4)), rng.uniform(-2, 2, (20, 3)), 1e-6 * rng.normal(size=(20, 3))
+    moved = plant.pose(Q + dQ) - plant.pose(Q - dQ)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", plant.jacobian(Q), 2 * dQ), moved, atol=1e-14)
+
+
+def test_the_experiment_finds_every_constraint_it_can_hold_without_noise():
+    for name, setting in constraints_trials.settings(0).items():
+        D = setting.record()
+        found = setting.estimator.fit(D.states, D.actions, groups=D.episodes)
+        assert nppe(D.policy, D.projections, found.predict(D.states)) < 1e-20, name
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recorded surfaces are not here")
+def test_the_recorded_surfaces_are_found():
+    flat, curved = constraints_surfaces.recordings(RECORDINGS)
+    constant = uc.ConstantConstraint().fit(flat.states, flat.actions, groups=flat.blocks(10))
+    assert constant.n_constraints_ == 1
+    plane = np.linalg.svd(flat.states - flat.states.mean(axis=0), full_matrices=False)[2][-1]
+    angle = np.degrees(np.arccos(abs(plane @ constant.rows_[0])))
+    assert angle < 3 * np.degrees(constant.uncertainty_)
+    errors = [
+        uc.risk.projected_observation_error(
+            curved.actions,
+            held_out_projections(each, curved.states, curved.actions, curved.blocks(10)),
+        )
+        for each in (uc.ConstantConstraint(1), uc.FeatureConstraint(uc.NormalizedRBF(5)))
+    ]
+    assert errors[1] < errors[0] / 4

@@ -12,7 +12,7 @@ from unconstrain.learnt_constraints import FeatureConstraint
 
 COLORS = (figures.LEARNT, figures.DIRECT, "#009E73", "#CC79A7")
 TASK = ("x", "y", "z", "ωx", "ωy", "ωz")
-NORMAL_LENGTH = 0.03
+NORMAL_LENGTH = 0.02
 """Of the drawn normals, in metres."""
 
 
@@ -110,8 +110,8 @@ def surfaces(found: Surfaces) -> Figure:
         ax.quiver(*X[::step].T, *up[::step].T, length=NORMAL_LENGTH, color=figures.LEARNT, linewidth=1.0)
         ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title=title)
         ax.set_aspect("equal")
-        ax.set_box_aspect(None, zoom=0.85)
-        ax.locator_params(nbins=4)
+        ax.set_box_aspect(None, zoom=0.95)
+        ax.locator_params(nbins=3)
     ax = figure.add_subplot(1, 3, 3)
     ax.plot(
         CENTERS, [found.curved_errors[f"{n} RBFs"] for n in CENTERS], "o-", color=figures.LEARNT, label="RBFs"

@@ -5,12 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.preprocessing import SplineTransformer
+from typer.testing import CliRunner
 
 import unconstrain as uc
 from problems import problems
+from unconstrain.cli.app import app
 from unconstrain.identifiability.information import of_recordings
 from unconstrain.identifiability.spectrum import directions
 from unconstrain.plants import arm, toy
+from unconstrain.uncertainty import Unsure
 
 
 def policies(X):
@@ -206,6 +209,34 @@ def test_the_report_speaks_in_the_users_words():
     assert "determined:" in repr(report)
     assert report.determined_shares([0.0, 1.1]).tolist() == [1.0, 0.0]
     assert report.determined_share_of_models.shape == (3,)
+
+
+def test_diagnose_warns_says_and_stops(tmp_path):
+    """`fit` warns, `diagnose` says where and what next and draws it, `rollout` ends where nothing is known."""
+    demos = toy.demonstrate(4, random_state=0)
+    recording, saved = str(tmp_path / "toy.npz"), str(tmp_path / "toy.skops")
+    uc.save(demos, recording)
+    model = ["--model", "rbf", "--width", "0.3", "--centers", "grid", "--alpha", "1e-6"]
+    fit = CliRunner().invoke(app, ["fit", recording, *model, "--out", saved])
+    assert "is not determined by these recordings; `unconstrain diagnose`" in fit.output
+    picture = tmp_path / "known.png"
+    told = CliRunner().invoke(app, ["diagnose", recording, *model, "--figure", str(picture)])
+    assert told.exit_code == 0
+    assert picture.stat().st_size > 0
+    for part in ("determined: ", "least known:", "at x1 = ", "record next:", "  3. Start at "):
+        assert part in told.output
+    everywhere = toy.demonstrate(40, random_state=0)
+    left = everywhere.select(everywhere.states[:, 0] < 0)
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.5)).fit(left.states, left.actions)
+    policy.save(saved)
+    move = ["rollout", saved, "--start=-0.7,0", "--steps", "400"]  # the cycle leads to the right
+    paths = ["--out", str(tmp_path / "path.csv"), "--figure", str(tmp_path / "path.png")]
+    stopped = CliRunner().invoke(app, [*move, *paths, "--stop-when-unsure", "0.3"])
+    assert "of 400 steps: the policy is known to within ±" in stopped.output
+    assert Unsure(policy, 0.3)(np.array([[-0.7, 0.0], [0.7, 0.0]])).tolist() == [False, True]
+    refused = CliRunner().invoke(app, [*move, *paths, "--stop-when-unsure", "1e-9"])
+    assert isinstance(refused.exception, uc.errors.UnconstrainError)
+    assert "at the start already" in str(refused.exception)
 
 
 X = np.random.default_rng(0).normal(size=(20, 2))

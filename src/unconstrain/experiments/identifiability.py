@@ -176,9 +176,9 @@ def _findings(results: list[dict], found: list[Surface]) -> tuple[str, ...]:
         share = (advised - begun) / (random - begun)
         sentences.append(
             f"{part[0].upper()}{part[1:]}: a median nUPE of {error:.2g} takes {random} demonstrations at random and "
-            f"{advised} as advised ({advised / random:.2f} of all; {share:.2f} of those added to the first {begun}): half "
-            f"is {'reached' if share <= 0.5 else 'not reached'}. With equally many, in the end, the error as advised is "
-            f"{last['advised'] / last['random']:.2f} of that at random."
+            f"{advised} as advised ({advised / random:.2f} of all; {share:.2f} of those added to the first {begun}): "
+            f"half is {'reached' if share <= 0.5 else 'not reached'}. With equally many, in the end, the error as "
+            f"advised is {last['advised'] / last['random']:.2f} of that at random."
         )
     for surface in found:
         sentences.append(

@@ -22,6 +22,7 @@ from unconstrain.policies.tally import Tally
 from unconstrain.progress import Report, reporting
 from unconstrain.readers.dataset import Dataset, Derivation
 from unconstrain.readers.roles import Keys
+from unconstrain.readers.table import Key
 from unconstrain.selection import EpisodeFolds
 from unconstrain.stream import (
     BATCH_ROWS,
@@ -60,8 +61,8 @@ def fit(
     *,
     state: Keys | None = None,
     action: Keys | None = None,
-    episode: str | None = None,
-    time: str | None = None,
+    episode: Key | None = None,
+    time: Key | None = None,
     time_unit: str | None = None,
     window: float = 0.2,
     gap: float | None = None,

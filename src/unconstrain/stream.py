@@ -29,6 +29,7 @@ from unconstrain.readers import dataset
 from unconstrain.readers.batches import Batches
 from unconstrain.readers.blocks import Block, Samples, Source
 from unconstrain.readers.roles import Keys
+from unconstrain.readers.table import Key
 from unconstrain.validation import check_samples
 
 BATCH_ROWS = 2**16
@@ -41,8 +42,8 @@ def fit_stream(
     *,
     state: Keys | None = None,
     action: Keys | None = None,
-    episode: str | None = None,
-    time: str | None = None,
+    episode: Key | None = None,
+    time: Key | None = None,
     time_unit: str | None = None,
     window: float = 0.2,
     gap: float | None = None,

@@ -10,7 +10,7 @@ from rich.table import Table
 from sklearn.base import clone
 
 from unconstrain import comparison, figures
-from unconstrain.cli import models, recordings, reporting
+from unconstrain.cli import models, recordings, reporting, streams
 from unconstrain.cli.recordings import (
     Action,
     Episode,
@@ -95,6 +95,8 @@ def fit(
     max_speed: MaxSpeed = None,
     min_speed: MinSpeed = None,
     min_duration: MinDuration = None,
+    checkpoint: streams.Checkpoint = None,
+    cluster: streams.Cluster = None,
 ) -> None:
     """Learn the unconstrained policy behind recordings, and save it.
 
@@ -123,6 +125,25 @@ def fit(
         model, risk=risk, alpha=models.decay(alpha), centers=centers, n_centers=n_centers, width=width
     )
     console = reporting.console()
+    if streams.is_meant(files, checkpoint, cluster):
+        if force is not None or free is not None:
+            raise PolicyError(
+                "streams are learnt without constraints: leave out --force and --free, or fit files at once"
+            )
+        streamed = streams.learn(
+            console,
+            named[model] if named else None,
+            files,
+            how,
+            checkpoint,
+            cluster,
+            figure=figure,
+            folds=folds,
+            min_speed=min_speed,
+        )
+        streamed.save(out)
+        console.print(f"policy: {out}")
+        return
     with console.status("reading"):
         felt = {"force": recordings.columns(force), "free": recordings.one_column(free, "--free")}
         demos = recordings.read(

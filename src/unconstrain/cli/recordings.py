@@ -9,7 +9,13 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.readers import load
 
-Files = Annotated[list[str], typer.Argument(help="CSV, NPZ or Parquet recordings.", metavar="FILES...")]
+Files = Annotated[
+    list[str],
+    typer.Argument(
+        help="CSV, NPZ or Parquet recordings; or a folder of Parquet files, or of a LeRobot dataset.",
+        metavar="FILES...",
+    ),
+]
 State = Annotated[
     str | None,
     typer.Option(

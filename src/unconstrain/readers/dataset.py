@@ -18,7 +18,7 @@ from unconstrain.readers.loading import NothingLeft, derived
 from unconstrain.readers.roles import Keys
 from unconstrain.readers.shards import Field, Paths, Piece, Shards
 from unconstrain.readers.stamps import seconds
-from unconstrain.readers.table import Column, Table
+from unconstrain.readers.table import Column, Key, Table
 from unconstrain.selection import EpisodeFolds
 
 DIFFERENTIATE = "differentiate"
@@ -218,8 +218,8 @@ def opened(
     source: Paths,
     state: Keys | None,
     action: Keys | None,
-    episode: str | None,
-    time: str | None,
+    episode: Key | None,
+    time: Key | None,
     batch_rows: int,
     **derivation: Any,
 ) -> Dataset:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -55,12 +56,16 @@ CHOICES = (
 
 
 def walls(humanoid: Humanoid, hands: Array, rng: np.random.Generator) -> Wall:
-    """A wall in front of the robot for each of the hands' starts (S, 2, 3), drawn anew while a hand is too near."""
+    """A wall in front of the robot for each of the hands' starts (S, 2, 3), drawn anew while a hand is too near.
+
+    Where a hand starts so far out that no such wall leaves it room, the walls drawn move farther away.
+    """
     (home, out), _ = humanoid.hand_motion(np.stack([humanoid.home, humanoid.outstretched]))
     points, normals = np.empty((2, len(hands), 3))
     for start, point, normal in zip(hands, points, normals, strict=True):
-        while True:
-            share, yaw, pitch = rng.uniform([NEAREST, -TILT, -TILT], [FARTHEST, TILT, TILT])
+        for draw in count():
+            farthest = FARTHEST + 0.1 * (draw // 100)
+            share, yaw, pitch = rng.uniform([NEAREST, -TILT, -TILT], [farthest, TILT, TILT])
             point[:] = (1 - share) * home.mean(axis=0) + share * out.mean(axis=0)
             normal[:] = -np.cos(yaw) * np.cos(pitch), -np.sin(yaw) * np.cos(pitch), np.sin(pitch)
             if ((start - point) @ normal > CLEARANCE).all():

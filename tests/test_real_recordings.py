@@ -93,7 +93,7 @@ def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     place = printed[1]
     flat, curved = (uc.load(place / f"{name}_circle.npz") for name in ("planer", "curve"))
     path = np.genfromtxt(place / "rollout.csv", delimiter=",", names=True)
-    learnt = np.column_stack([path["x1"], path["x2"], path["x3"]])
+    learnt = np.column_stack([path["x"], path["y"], path["z"]])
     both = uc.Demonstrations.concatenate([flat, curved])
     direct = uc.ParametricPolicy(risk="direct", alpha="cv").fit(
         both.states, both.actions, groups=both.blocks(5)
@@ -111,6 +111,7 @@ def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     assert abs(thinnest @ surface[0]) > 0.999
 
     across = np.linalg.svd(flat.actions, full_matrices=False)[2][2]
+    assert np.sum((flat.actions @ across) ** 2) / np.sum(flat.actions**2) == pytest.approx(0.06, abs=0.005)
     shares = []
     for name in ("flat-circle", "flat-circle-direct"):
         P = uc.load_policy(place / f"{name}.skops").predict(curved.states)

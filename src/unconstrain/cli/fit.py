@@ -160,6 +160,7 @@ def fit(
     chosen, table = _compare(console, demos, groups, model, named, risk, known)
     policy = table.policies[chosen]
     policy.recording_ = how
+    policy.state_names_ = list(demos.state_names)
     console.print(
         f"zero actions: {policy.n_zero_actions_} without a direction, left out by the inconsistency"
     )

@@ -94,9 +94,11 @@ def _numbers(text: str, option: str, wanted: int) -> np.ndarray:
 
 
 def _names(policy) -> list[str]:
-    """The states' names where the recordings had them, else x1, x2, ..."""
-    known = getattr(policy, "recording_", {}).get("state") or []
-    if len(known) == policy.n_features_in_ and all(isinstance(name, str) for name in known):
+    """The states' names where the recordings had them and they tell columns apart, else x1, x2, ..."""
+    known = getattr(policy, "state_names_", None) or getattr(policy, "recording_", {}).get("state") or []
+    distinct = {"t", *known, *(f"{name}_velocity" for name in known)}
+    named = len(known) == policy.n_features_in_ and all(isinstance(name, str) for name in known)
+    if named and len(distinct) == 2 * len(known) + 1:
         return list(known)
     return [f"x{i + 1}" for i in range(policy.n_features_in_)]
 

@@ -1,8 +1,8 @@
 """Run the benchmarks, print one table, write one JSON.
 
-    python -m benchmarks                      all
-    python -m benchmarks local-fit growth     some
-    python -m benchmarks --out FILE           where the JSON goes (default out/benchmarks.json)
+python -m benchmarks                      all
+python -m benchmarks local-fit growth     some
+python -m benchmarks --out FILE           where the JSON goes (default out/benchmarks.json)
 """
 
 import argparse
@@ -48,14 +48,22 @@ def main() -> None:
     given = parser.parse_args()
     unknown = set(given.names) - set(BENCHMARKS)
     if unknown:
-        parser.error(f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(BENCHMARKS)}")
-    ratios = [BENCHMARKS[name]() for name in track(given.names or list(BENCHMARKS), "benchmarks", transient=True)]
+        parser.error(
+            f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(BENCHMARKS)}"
+        )
+    ratios = [
+        BENCHMARKS[name]() for name in track(given.names or list(BENCHMARKS), "benchmarks", transient=True)
+    ]
     given.out.parent.mkdir(parents=True, exist_ok=True)
     versions = {"unconstrain": uc.__version__, "numpy": np.__version__, "scipy": scipy.__version__}
     versions |= {"scikit-learn": sklearn.__version__, "python": platform.python_version()}
-    given.out.write_text(json.dumps({"versions": versions, "ratios": [asdict(r) for r in ratios]}, indent=1) + "\n")
+    given.out.write_text(
+        json.dumps({"versions": versions, "ratios": [asdict(r) for r in ratios]}, indent=1) + "\n"
+    )
 
-    table = Table("name", "work", "measured against", "ratio", "reach", "", title="unconstrain, speed as ratios")
+    table = Table(
+        "name", "work", "measured against", "ratio", "reach", "", title="unconstrain, speed as ratios"
+    )
     for r in ratios:
         sign = ">=" if r.more_is_better else "<="
         verdict = "reached" if r.reached else "missed"

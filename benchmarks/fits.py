@@ -23,7 +23,9 @@ def local_fit() -> Ratio:
     policy = uc.LocallyLinearPolicy(centers=X[:50].copy(), width=3**0.5)
     reference = yardsticks.dgemm(50, 10_000, 36 * 28)
     ours, blas = medians(lambda: policy.fit(X, U), reference, repeats=15)
-    return Ratio("local-fit", "N=10,000, n=d=7, M=50, fit", "dgemm 50x10,000x1,008", ours / blas, 2.5, ours, blas)
+    return Ratio(
+        "local-fit", "N=10,000, n=d=7, M=50, fit", "dgemm 50x10,000x1,008", ours / blas, 2.5, ours, blas
+    )
 
 
 def parametric_fit() -> Ratio:
@@ -32,7 +34,9 @@ def parametric_fit() -> Ratio:
     policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:100].copy(), width=2.0))
     reference = yardsticks.dsyrk_in_blocks(700, 200_000)
     ours, blas = medians(lambda: policy.fit(X, U), reference, repeats=3)
-    return Ratio("parametric-fit", "N=200,000, d=7, 100 RBFs, fit", "dsyrk 700x200,000", ours / blas, 1.3, ours, blas)
+    return Ratio(
+        "parametric-fit", "N=200,000, d=7, 100 RBFs, fit", "dsyrk 700x200,000", ours / blas, 1.3, ours, blas
+    )
 
 
 def wide_fit() -> Ratio:
@@ -41,7 +45,9 @@ def wide_fit() -> Ratio:
     policy = uc.ParametricPolicy()
     reference = yardsticks.dsyrk_in_blocks(756, 200_000)
     ours, blas = medians(lambda: policy.fit(X, U), reference, repeats=3)
-    return Ratio("wide-fit", "N=200,000, linear, n=d=27, fit", "dsyrk 756x200,000", ours / blas, 0.8, ours, blas)
+    return Ratio(
+        "wide-fit", "N=200,000, linear, n=d=27, fit", "dsyrk 756x200,000", ours / blas, 0.8, ours, blas
+    )
 
 
 def lambda_path() -> Ratio:
@@ -51,7 +57,9 @@ def lambda_path() -> Ratio:
     features = uc.NormalizedRBF(centers=X[:100].copy(), width=2.0)
     chosen, given = uc.ParametricPolicy(features, alpha="cv"), uc.ParametricPolicy(features, alpha=1e-3)
     ours, one = medians(lambda: chosen.fit(X, U, groups=groups), lambda: given.fit(X, U), repeats=3)
-    return Ratio("lambda-path", "parametric-fit with 25 λ x 5 folds", "the same with one λ", ours / one, 2.0, ours, one)
+    return Ratio(
+        "lambda-path", "parametric-fit with 25 λ x 5 folds", "the same with one λ", ours / one, 2.0, ours, one
+    )
 
 
 def lambda_path_local() -> Ratio:
@@ -62,7 +70,13 @@ def lambda_path_local() -> Ratio:
     chosen, given = uc.LocallyLinearPolicy(**place, alpha="cv"), uc.LocallyLinearPolicy(**place, alpha=1e-3)
     ours, one = medians(lambda: chosen.fit(X, U, groups=groups), lambda: given.fit(X, U), repeats=7)
     return Ratio(
-        "lambda-path-local", "local-fit with 25 λ x 5 folds", "the same with one λ", ours / one, 2.0, ours, one
+        "lambda-path-local",
+        "local-fit with 25 λ x 5 folds",
+        "the same with one λ",
+        ours / one,
+        2.0,
+        ours,
+        one,
     )
 
 
@@ -82,7 +96,14 @@ def loop() -> Ratio:
         repeats=3,
     )
     return Ratio(
-        "loop", "local-fit", "loop over samples, 1/20 x 20", 20 * published / ours, 200.0, ours, 20 * published, True
+        "loop",
+        "local-fit",
+        "loop over samples, 1/20 x 20",
+        20 * published / ours,
+        200.0,
+        ours,
+        20 * published,
+        True,
     )
 
 
@@ -92,4 +113,6 @@ def growth() -> Ratio:
     policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:100].copy(), width=2.0))
     part = len(X) // 10
     whole, tenth = medians(lambda: policy.fit(X, U), lambda: policy.fit(X[:part], U[:part]), repeats=3)
-    return Ratio("growth", "parametric-fit at N = 200,000", "at N = 20,000", whole / tenth, 10.5, whole, tenth)
+    return Ratio(
+        "growth", "parametric-fit at N = 200,000", "at N = 20,000", whole / tenth, 10.5, whole, tenth
+    )

@@ -26,7 +26,9 @@ def dgemm(rows: int, inner: int, columns: int) -> Callable[[], object]:
     return lambda: A @ B
 
 
-def published_local_fit(X: np.ndarray, U: np.ndarray, centers: np.ndarray, width: float, alpha: float) -> np.ndarray:
+def published_local_fit(
+    X: np.ndarray, U: np.ndarray, centers: np.ndarray, width: float, alpha: float
+) -> np.ndarray:
     """Local models by the algorithm as published: one outer product per sample per model. Returns w (M, d(n+1))."""
     n, d = X.shape[1], U.shape[1]
     solutions = np.empty((len(centers), d * (n + 1)))

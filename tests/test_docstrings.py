@@ -6,7 +6,11 @@ import pytest
 
 import unconstrain
 
-MODULES = [name for _, name, _ in pkgutil.walk_packages(unconstrain.__path__, "unconstrain.") if "__main__" not in name]
+MODULES = [
+    name
+    for _, name, _ in pkgutil.walk_packages(unconstrain.__path__, "unconstrain.")
+    if "__main__" not in name
+]
 
 
 @pytest.mark.parametrize("name", MODULES)

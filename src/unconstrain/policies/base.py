@@ -122,7 +122,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         persistence.save(self, path)
 
     def compile(self) -> CompiledPolicy:
-        """The fitted policy for a control loop: `step = policy.compile()`; `step(x)` for a state (n,) or a batch (N, n).
+        """The fitted policy for a control loop: `step = policy.compile()`; `step(x)` for states (n,) or (N, n).
 
         A small immutable callable that does not need scikit-learn and agrees with `predict` to 1e-12 of the largest
         term either adds up, which is checked here. See `CompiledPolicy`. Raises `PolicyError` for features that

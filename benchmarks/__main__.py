@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, stream
+from benchmarks import fits, identifiability, step, stream
 from benchmarks.ratio import Ratio
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
@@ -38,6 +38,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-local": stream.local,
     "stream-linear-memory": stream.linear_memory,
     "stream-local-memory": stream.local_memory,
+    **step.BENCHMARKS,
 }
 
 

@@ -123,3 +123,18 @@ def test_the_whole_path_of_alphas_solves_the_regularised_equations():
 def test_no_data_at_all_gives_a_policy_that_stays_put(scale):
     moments = Moments(np.eye(3) * scale, np.zeros((3, 1)), np.asarray(0.0), np.asarray(0.0))
     assert np.all(moments.decompose().solve([0.0, 1.0]) == 0)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1e-12, 1e-6, 1.0]))
+def test_one_alpha_alone_gives_what_the_path_gives(seed, alpha):
+    rng = np.random.default_rng(seed)
+    V, r = rng.normal(size=(3, 30, 5)), rng.normal(size=(3, 30))
+    V[0, :, 0] = 0.0  # one of the problems says nothing about one parameter
+    moments = Moments(
+        np.einsum("mnp,mnq->mpq", V, V),
+        np.einsum("mnp,mn->mp", V, r)[:, :, None],
+        np.sum(r**2, axis=1),
+        np.full(3, 30.0),
+    )
+    path = moments.decompose().solve([alpha])[..., 0, :]
+    np.testing.assert_allclose(moments.solve(alpha), path, rtol=1e-6, atol=1e-9)

@@ -18,6 +18,10 @@ import numpy as np
 
 from unconstrain.parallel import blocks, shared_out
 
+# λ relative to the mean eigenvalue of H. What rounding leaves of g where H is silent is then divided by enough to stay
+# a millionth of the policy.
+CLEAR_OF_ROUNDING = 1e-10
+
 
 @dataclass
 class Moments:
@@ -74,6 +78,18 @@ class Moments:
         Hw = (self.H @ w.reshape(*batch, P, L * K)).reshape(w.shape)
         error = np.einsum("...plk,...plk->...l", w, Hw - 2 * self.g[..., :, None, :])
         return np.maximum(error + self.squares[..., None], 0.0)
+
+    def solve(self, alpha: float) -> np.ndarray:
+        """`w = (H + λI)⁺ g` of least norm for one λ: (..., P, K).
+
+        Where λ lifts H well clear of its rounding the equations are solved as they stand, at a tenth of the cost of
+        the eigendecomposition that is needed otherwise, and for many λ.
+        """
+        P = self.H.shape[-1]
+        mean_eigenvalue = np.trace(self.H, axis1=-2, axis2=-1) / P
+        if np.all(alpha > CLEAR_OF_ROUNDING * mean_eigenvalue):
+            return np.linalg.solve(self.H + alpha * np.eye(P), self.g)
+        return self.decompose().solve([alpha])[..., 0, :]
 
     def decompose(self) -> "Spectrum":
         """The eigendecomposition of H, which solves for every λ at once."""

@@ -293,13 +293,15 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
 
     def _solve(self) -> None:
         folds = [fold for fold in self.moments_ if fold is not None]
-        spectrum = Moments.sum(folds).decompose()
+        total = Moments.sum(folds)
         if self.alpha == "cv":
+            spectrum = total.decompose()
             chosen = selection.choose_alpha(folds, float(spectrum.values.max()))
             self.alpha_, self.alphas_, self.held_out_risk_ = chosen
+            w = spectrum.solve([self.alpha_])[..., 0, :]
         else:
             self.alpha_ = float(self.alpha)
-        w = spectrum.solve([self.alpha_])[..., 0, :]
+            w = total.solve(self.alpha_)
         self._take_up(w.swapaxes(-1, -2).reshape(*w.shape[:-2], -1))
 
     def __sklearn_tags__(self):

@@ -20,7 +20,8 @@ from unconstrain.risk import Sight
 
 # Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
 # in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.
-PRODUCTS_IN_BLOCK = 2**19
+PRODUCTS_IN_BLOCK = 2**20
+LOCAL_PRODUCTS_IN_BLOCK = 2**19
 ROWS_IN_BLOCK = 2**21
 
 Totals = list[np.ndarray]
@@ -68,7 +69,7 @@ def local_moments(
         total += receptive.T @ summed.T
 
     n_summed = n_products + n_pulls + 2
-    rows = _rows(PRODUCTS_IN_BLOCK, n_summed)
+    rows = _rows(LOCAL_PRODUCTS_IN_BLOCK, n_summed)
     # The second is no total but each thread's working space: memory new for every block would cost a fifth more.
     total, _ = _sum_over_blocks(len(X), rows, [(M, n_summed), (n_summed, rows)], add)
     H, g = total[:, :n_products], total[:, n_products:-2]

@@ -37,6 +37,11 @@ def simulator() -> ModuleType:
             f"Robots are simulated by MuJoCo, which cannot be imported here ({error}): "
             "pip install 'unconstrain[sim]'"
         ) from error
+    except Exception as error:  # MuJoCo looks for OpenGL while it is imported, and how that fails differs
+        raise UnconstrainError(
+            f"MuJoCo cannot be imported with MUJOCO_GL={os.environ.get('MUJOCO_GL')} ({error}): unset it, or "
+            "install the OpenGL that it names"
+        ) from error
     return mujoco
 
 

@@ -172,6 +172,19 @@ def test_forces_without_noise_are_exact_and_filtering_never_crosses_an_edge():
     np.testing.assert_allclose(N, expected, atol=1e-12)
 
 
+def test_what_is_said_of_an_episode_does_not_depend_on_the_others():
+    """Or a stream, which sees a few at a time, could not say the same."""
+    slides = [slide(noise=0.3, friction=0.4, seed=seed, samples=130 + 20 * seed) for seed in range(3)]
+    U = np.concatenate([10.0**seed * each[0] for seed, each in enumerate(slides)])
+    forces = np.concatenate([each[1] for each in slides])
+    episodes = np.repeat([2, 0, 1], [len(each[0]) for each in slides])
+    together = constraints.from_forces(forces, 2.0, actions=U, episodes=episodes, margin=2)
+    for label in range(3):
+        own = episodes == label
+        alone = constraints.from_forces(forces[own], 2.0, actions=U[own], margin=2)
+        np.testing.assert_array_equal(together[own], alone)
+
+
 def test_what_could_be_contact_or_not_is_unknown():
     size = np.array([0, 0, 1.5, 1.5, 0, 0, 1.5, 3, 3, 1.5, 0, 0], dtype=float)
     touching, _ = constraints.contact(size[:, None] * [[0.0, 1.0]], 2.0, window=1)

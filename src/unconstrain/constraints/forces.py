@@ -22,13 +22,14 @@ from unconstrain.constraints.known import _jacobians, from_normals
 from unconstrain.errors import DataError
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 FRICTION = 0.5
 """Share of the measured force that has to be at right angles to the motion: that of friction coefficients up to √3."""
 
 
 SLOW = 0.1
-"""Below this share of the root mean square speed, the direction of motion is noise and friction is left in."""
+"""Below this share of its episode's root mean square speed the direction of motion is noise; friction is left in."""
 
 
 def contact(
@@ -52,7 +53,7 @@ def contact(
     window : int
         Samples, an odd number, of the median and of the average within a contact. 1 filters nothing.
     episodes : array (N,), optional
-        Nothing is filtered across episodes.
+        Nothing is filtered across episodes, and what is said of one does not depend on the others.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def contact(
         If the forces are not finite and (N, m), or a number makes no sense.
     """
     F = _checked(forces)
-    return _contact(F, F, threshold, release, window, episodes)
+    return _contact(F, F, threshold, release, window, _by_episode(episodes, len(F)))
 
 
 def _contact(
@@ -76,9 +77,9 @@ def _contact(
     threshold: float,
     release: float | None,
     window: int,
-    episodes: ArrayLike | None,
+    each: list[Rows],
 ) -> tuple[Array, Array]:
-    """Contact is read off forces F, the direction off `directed`."""
+    """Contact is read off forces F, the direction off `directed`, in each episode by itself."""
     if not (np.isfinite(threshold) and threshold > 0):
         raise DataError(
             f"the force threshold must be a number above zero, in the unit of the forces, got {threshold!r}"
@@ -90,16 +91,8 @@ def _contact(
         )
     if isinstance(window, bool) or not isinstance(window, int | np.integer) or window < 1 or window % 2 == 0:
         raise DataError(f"the window must be an odd number of samples, got {window!r}")
-    labels = np.zeros(len(F), dtype=int) if episodes is None else np.asarray(episodes)
-    if labels.shape != (len(F),):
-        raise DataError(
-            f"there are {len(F)} forces and episode labels of shape {labels.shape}: give one a sample"
-        )
-
     touching, steadied = np.zeros(len(F)), np.zeros_like(F)
-    order = np.argsort(labels, kind="stable")
-    bounds = np.flatnonzero(labels[order][1:] != labels[order][:-1]) + 1
-    for own in np.split(order, bounds):
+    for own in each:
         calm = median_filter(F[own], size=(window, 1), mode="nearest")
         size = np.linalg.norm(calm, axis=1)
         for run in _runs(size > release):
@@ -152,23 +145,26 @@ def from_forces(
     """
     F = _checked(forces)
     J = None if jacobian is None else _jacobians(jacobian, *F.shape)
-    along = None if actions is None else _directions(np.asarray(actions, dtype=np.float64), F, J)
+    each = _by_episode(episodes, len(F))
+    along = None if actions is None else _directions(np.asarray(actions, dtype=np.float64), F, J, each)
     blocking = F if along is None else _across(F, along)
-    touching, steadied = _contact(F, blocking, threshold, release, window, episodes)
+    touching, steadied = _contact(F, blocking, threshold, release, window, each)
     unknown = np.isnan(touching)
     if along is not None:
         # The mean over the window may lean a little the way this very sample moves, which it did.
         steadied = _across(steadied, along)
-        size = np.linalg.norm(median_filter(F, size=(window, 1), mode="nearest"), axis=1)
+        size = np.empty(len(F))
+        for own in each:
+            size[own] = np.linalg.norm(median_filter(F[own], size=(window, 1), mode="nearest"), axis=1)
         unknown |= (touching == 1) & (np.linalg.norm(steadied, axis=1) < FRICTION * size)
     if margin:
-        unknown |= _near_change(touching, margin, episodes)
+        unknown |= _near_change(touching, margin, each)
     N = from_normals(steadied, J)
     N[unknown] = np.nan
     return N
 
 
-def _directions(U: Array, F: Array, J: Array | None) -> Array:
+def _directions(U: Array, F: Array, J: Array | None, each: list[Rows]) -> Array:
     """Directions (N, m) in which the point touched moves; zero where it hardly does."""
     if len(U) != len(F):
         raise DataError(f"there are {len(F)} forces and {len(U)} actions: give one force a sample")
@@ -181,13 +177,26 @@ def _directions(U: Array, F: Array, J: Array | None) -> Array:
             "the force along the actions, or the Jacobian that leads from one to the other"
         )
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
-    moves = speed > SLOW * np.sqrt(np.mean(speed**2))
+    moves = np.empty_like(speed, dtype=bool)
+    for own in each:
+        moves[own] = speed[own] > SLOW * np.sqrt(np.mean(speed[own] ** 2))
     return np.divide(velocity, speed, out=np.zeros_like(velocity), where=moves)
 
 
 def _across(F: Array, along: Array) -> Array:
     """What of F (N, m) is at right angles to unit vectors (N, m)."""
     return F - np.einsum("nm,nm->n", F, along)[:, None] * along
+
+
+def _by_episode(episodes: ArrayLike | None, count: int) -> list[Rows]:
+    """The rows of each episode, in their order."""
+    labels = np.zeros(count, dtype=int) if episodes is None else np.asarray(episodes)
+    if labels.shape != (count,):
+        raise DataError(
+            f"there are {count} forces and episode labels of shape {labels.shape}: give one a sample"
+        )
+    order = np.argsort(labels, kind="stable")
+    return np.split(order, np.flatnonzero(labels[order][1:] != labels[order][:-1]) + 1)
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[slice]:
@@ -197,11 +206,9 @@ def _runs(mask: NDArray[np.bool_]) -> list[slice]:
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _near_change(touching: Array, margin: int, episodes: ArrayLike | None) -> NDArray[np.bool_]:
-    labels = np.zeros(len(touching), dtype=int) if episodes is None else np.asarray(episodes)
+def _near_change(touching: Array, margin: int, each: list[Rows]) -> NDArray[np.bool_]:
     near = np.zeros(len(touching), dtype=bool)
-    order = np.argsort(labels, kind="stable")
-    for own in np.split(order, np.flatnonzero(labels[order][1:] != labels[order][:-1]) + 1):
+    for own in each:
         state = np.nan_to_num(touching[own], nan=-1.0)
         for change in np.flatnonzero(state[1:] != state[:-1]) + 1:
             near[own[max(change - margin, 0) : change + margin]] = True

@@ -103,6 +103,8 @@ def test_partial_fit_may_know_some_batches_and_not_others():
     whole = clone(policy).fit(X, U, projections=N)
     pieces = clone(policy).partial_fit(X[:60], U[:60], projections=N[:60]).partial_fit(X[60:], U[60:])
     np.testing.assert_allclose(pieces.predict(X), whole.predict(X), atol=1e-9)
+    assert pieces.n_known_constraints_ == whole.n_known_constraints_ == 60
+    assert clone(policy).fit(X, U).n_known_constraints_ == 0
 
 
 # Measurements

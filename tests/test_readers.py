@@ -284,13 +284,14 @@ def test_what_is_saved_comes_back_exactly(tmp_path, data, suffix):
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     used, codes = np.unique(rng.integers(0, 4, N), return_inverse=True)
     maybe = st.booleans()
+    projections = np.where(rng.random((N, 1, 1)) < 0.3, np.nan, rng.normal(size=(N, d, d)))  # NaN: not known
     demos = Demonstrations(
         states=rng.normal(size=(N, n)),
         actions=rng.normal(size=(N, d)) * 1e-300,
         episodes=codes,
         time=rng.normal(size=N) if data.draw(maybe) else None,
         policy=rng.normal(size=(N, d)) if data.draw(maybe) else None,
-        projections=rng.normal(size=(N, d, d)) if data.draw(maybe) else None,
+        projections=projections if data.draw(maybe) else None,
         state_names=data.draw(st.lists(names, min_size=n, max_size=n)),
         action_names=data.draw(st.lists(names, min_size=d, max_size=d)),
         episode_labels=data.draw(st.lists(names, min_size=len(used), max_size=len(used))),

@@ -52,6 +52,7 @@ def save(path: str | os.PathLike[str], belongs_to: dict[str, str], progress: Pro
         "zero": tally.n_zero,
         "longest": tally.longest,
         "shortest": None if np.isinf(tally.shortest) else tally.shortest,
+        "known": tally.n_known,
         "done": progress.done,
         "longest_known": progress.longest,
     }
@@ -83,6 +84,7 @@ def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy
             int(about["zero"]),
             float(about["longest"]),
             np.inf if about["shortest"] is None else float(about["shortest"]),
+            int(about.get("known", 0)),  # not in checkpoints of streams that carried none
         )
         return Progress(policy, tally, int(about["done"]), float(about["longest_known"]))
     except UnconstrainError:

@@ -31,7 +31,7 @@ class Demonstrations:
     policy : array (N, d), optional
         The true unconstrained action π(x), known only in simulation.
     projections : array (N, d, d), optional
-        The true nullspace projections N(x), known only in simulation.
+        What is known of the nullspace projections N(x); in simulation, the true ones. All NaN where not known.
     forces : array (N, m), optional
         Measured contact forces; see `constraints.from_recording`.
     free : array (N,), optional
@@ -54,7 +54,8 @@ class Demonstrations:
     Raises
     ------
     DataError
-        No samples, lengths or dimensions that disagree, NaN or infinity, labels that do not match.
+        No samples, lengths or dimensions that disagree, labels that do not match, infinity, or NaN other than of
+        projections not known.
     """
 
     states: Array
@@ -95,9 +96,7 @@ class Demonstrations:
             "episodes": codes,
             "time": None if time is None else _shaped("time", _numbers("time", time), (N,)),
             "policy": None if policy is None else _shaped("policy", _numbers("policy", policy), (N, d)),
-            "projections": None
-            if projections is None
-            else _shaped("projections", _numbers("projections", projections), (N, d, d)),
+            "projections": None if projections is None else _projections(projections, N, d),
             "forces": None if forces is None else _forces(forces, N),
             "free": None if free is None else _flags(free, N),
             "state_names": _names("state_names", state_names, "x", n),
@@ -285,11 +284,27 @@ class Demonstrations:
 
 
 def _numbers(what: str, values: ArrayLike) -> Array:
+    array = _array(what, values)
+    _check_finite(what, array, np.isfinite(array))
+    return array
+
+
+def _projections(values: ArrayLike, count: int, d: int) -> Array:
+    array = _shaped("projections", _array("projections", values), (count, d, d))
+    unknown = np.isnan(array).all(axis=(1, 2), keepdims=True)
+    _check_finite("projections", array, np.isfinite(array) | unknown)
+    return array
+
+
+def _array(what: str, values: ArrayLike) -> Array:
     try:
-        array = np.ascontiguousarray(values, dtype=np.float64)
+        return np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(f"{what} must be an array of numbers ({error})") from error
-    bad = np.argwhere(~np.isfinite(array))
+
+
+def _check_finite(what: str, array: Array, good: NDArray[np.bool_]) -> None:
+    bad = np.argwhere(~good)
     if len(bad):
         row, *rest = bad[0].tolist()
         column = f", column {rest[0]}" if rest else ""
@@ -297,7 +312,6 @@ def _numbers(what: str, values: ArrayLike) -> Array:
             f"{what} hold {array[tuple(bad[0])]} at row {row}{column} (counted from 0); "
             "leave such samples out or fill them in"
         )
-    return array
 
 
 def _samples(what: str, values: ArrayLike) -> Array:

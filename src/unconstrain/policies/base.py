@@ -46,6 +46,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     n_actions_: int
     n_samples_seen_: int
     n_zero_actions_: int
+    n_known_constraints_: int
     longest_action_: float
     shortest_action_: float
 
@@ -216,7 +217,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         self.moments_ = []
         self.n_actions_ = d
         self.actions_are_scalars_ = scalars
-        self.n_samples_seen_, self.n_zero_actions_ = 0, 0
+        self.n_samples_seen_, self.n_zero_actions_, self.n_known_constraints_ = 0, 0, 0
         self.longest_action_, self.shortest_action_ = 0.0, math.inf
         if self.alpha == "cv":
             self.folds_ = selection.EpisodeFolds()
@@ -256,6 +257,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             len(U) - int(np.count_nonzero(moves)),
             longest,
             float(lengths.min(initial=math.inf, where=moves)),
+            0 if projections is None else int(np.count_nonzero(~risks.unknown(projections))),
         )
 
     def _counted(self, moves: np.ndarray, weights: np.ndarray, projections: np.ndarray | None) -> np.ndarray:
@@ -270,19 +272,25 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             self.n_samples_seen_,
             self.n_zero_actions_,
             self.longest_action_,
-            # Policies saved before this was kept know no shorter one than any.
+            # Policies saved before these were kept know no shorter one than any, and of no constraint.
             getattr(self, "shortest_action_", math.inf),
+            getattr(self, "n_known_constraints_", 0),
         )
         total += tally
         self.moments_ = list(total.moments)
         self.n_samples_seen_, self.n_zero_actions_ = total.n_samples, total.n_zero
         self.longest_action_, self.shortest_action_ = total.longest, total.shortest
+        self.n_known_constraints_ = total.n_known
 
-    def _checked_projections(self, projections, U: np.ndarray) -> np.ndarray | None:
-        if self.risk not in ("auto", "constrained") and projections is not None:
+    def _check_uses_projections(self) -> None:
+        if self.risk not in ("auto", "constrained"):
             raise PolicyError(
                 f'projections are for risk="auto" and "constrained", and this policy has risk="{self.risk}"'
             )
+
+    def _checked_projections(self, projections, U: np.ndarray) -> np.ndarray | None:
+        if projections is not None:
+            self._check_uses_projections()
         if projections is None and self.risk != "constrained":
             return None
         if projections is None:

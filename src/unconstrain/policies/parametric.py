@@ -24,7 +24,8 @@ class ParametricPolicy(Policy):
         it by held-out risk among 25 values over five folds of episodes.
 
     After `fit`: `weights_` (P,), `features_`, `alpha_`, `n_zero_actions_` (how many samples have no direction; the
-    inconsistency leaves them out), `n_samples_seen_`; with "cv" `alphas_` and `held_out_risk_`, (25,).
+    inconsistency leaves them out), `n_known_constraints_` (of how many the constraint was known, 0 without
+    projections), `n_samples_seen_`; with "cv" `alphas_` and `held_out_risk_`, (25,).
 
     >>> import numpy as np, unconstrain as uc
     >>> X = np.random.default_rng(0).normal(size=(200, 2))

@@ -13,7 +13,7 @@ class Tally:
     """Moments by fold, and the counts a fit reports. Tallies add, in any order and grouping.
 
     moments: by fold, None where a fold has no samples.
-    n_samples: samples looked at; n_zero: those of them that do not move.
+    n_samples: samples looked at; n_zero: those of them that do not move; n_known: those whose constraint is known.
     longest: length of the longest action; shortest: of the shortest one that was taken for motion, in the action's
         unit. Whether an action moves depends on the longest of all: one left out stays out whatever is to come, one
         taken in may turn out to be rounding.
@@ -24,6 +24,7 @@ class Tally:
     n_zero: int = 0
     longest: float = 0.0
     shortest: float = math.inf
+    n_known: int = 0
 
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(
@@ -35,6 +36,7 @@ class Tally:
             self.n_zero + other.n_zero,
             max(self.longest, other.longest),
             min(self.shortest, other.shortest),
+            self.n_known + other.n_known,
         )
 
     def dealt_from(self, first: int, n_folds: int) -> "Tally":

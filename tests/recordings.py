@@ -23,8 +23,35 @@ def movements(n_episodes=23, seed=0, n=3, smallest=20):
     return np.concatenate(X), np.concatenate(U), np.concatenate(episodes), np.concatenate(time)
 
 
-def write(folder, X, U, episodes, time, cuts, *, lists=False, kind=np.float64, **options):
-    """Parquet files `part-0.parquet`, ..., cut at these rows."""
+def touched(U, episodes, seed=0):
+    """What is known of constraints on actions (N, 3): as files hold it, by column.
+
+    Noisy forces of a contact in the middle of each episode, flags that say free for some samples, and projections, of
+    which every third is not known, as lists and row by row.
+    """
+    rng = np.random.default_rng(seed)
+    forces, free = 0.3 * rng.normal(size=U.shape), np.zeros(len(U))
+    N = np.empty((len(U), 3, 3))
+    for label in np.unique(episodes):
+        own = np.flatnonzero(episodes == label)
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        contact = own[len(own) // 4 : len(own) // 4 + rng.integers(3, len(own) // 2)]
+        forces[contact] += rng.uniform(1.0, 6.0) * normal
+        free[own[-4:]] = 1.0
+        N[own] = np.eye(3) - np.outer(normal, normal)
+    N[rng.random(len(U)) < 1 / 3] = np.nan
+    rows = [None if np.isnan(row).any() else row for row in N.reshape(-1, 9)]
+    return {
+        **{f"f{j}": forces[:, j] for j in range(3)},
+        "free": free,
+        "N": pa.array(rows, pa.list_(pa.float64())),
+        **{f"n{j}": N.reshape(-1, 9)[:, j] for j in range(9)},
+    }
+
+
+def write(folder, X, U, episodes, time, cuts, *, lists=False, kind=np.float64, more=None, **options):
+    """Parquet files `part-0.parquet`, ..., cut at these rows; with `more` columns."""
     folder.mkdir(exist_ok=True)
     bounds = [0, *cuts, len(X)]
     for i, (a, b) in enumerate(pairwise(bounds)):
@@ -39,6 +66,7 @@ def write(folder, X, U, episodes, time, cuts, *, lists=False, kind=np.float64, *
             columns = {f"x{j}": pa.array(X[a:b, j].astype(kind)) for j in range(X.shape[1])}
             columns |= {f"u{j}": pa.array(U[a:b, j].astype(kind)) for j in range(U.shape[1])}
         columns |= {"episode_index": pa.array(episodes[a:b]), "timestamp": pa.array(time[a:b])}
+        columns |= {name: pa.array(values[a:b]) for name, values in (more or {}).items()}
         columns |= {"note": pa.array(["never read"] * (b - a))}
         pq.write_table(pa.table(columns), folder / f"part-{i}.parquet", **options)
     return folder

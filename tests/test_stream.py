@@ -407,7 +407,7 @@ def test_broken_files_are_named(tmp_path, how, sentence):
         (lambda f, p: stream.fit_stream(uc.ParametricPolicy(alpha="cv"), [(X, U)]), "needs episodes"),
         (
             lambda f, p: stream.fit_stream(uc.ParametricPolicy(risk="constrained"), [(X, U)]),
-            "use partial_fit",
+            r"name columns with projections=.* or give batches \(X, U, groups, projections\)",
         ),
         (lambda f, p: stream.fit_stream(uc.ParametricPolicy(alpha="cv"), [(X, U, 0 * TIME)]), "two episodes"),
         (lambda f, p: stream.fit_stream("linear", [(X, U)]), "policy must be one of"),

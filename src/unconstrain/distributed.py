@@ -1,26 +1,26 @@
 """The pass over a stream on a Dask cluster: workers turn parts of the data into moments, and only these travel.
 
-A part is a run of row groups (of whole episodes, where the states are differentiated). Its moments are P² + P numbers
-a fold, whatever its size; pairs of neighbours are added until one is left, on the workers. Which fold an episode
-belongs to is decided before, by a pass over the episode column alone, so that it is the fold `fit_stream` puts it in.
+A part is a run of row groups (of whole episodes, where states are differentiated or forces filtered). Its moments are
+P² + P numbers a fold, whatever its size; pairs of neighbours are added until one is left, on the workers. Which fold an
+episode belongs to is decided before, by a pass over the episode column alone, so that it is the fold `fit_stream` puts
+it in.
 """
 
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.policies.base import Policy
 from unconstrain.policies.tally import Tally
 from unconstrain.progress import Report, reporting
-from unconstrain.readers.dataset import Dataset, Derivation
+from unconstrain.readers.dataset import Dataset
 from unconstrain.readers.roles import Keys
 from unconstrain.readers.table import Key
 from unconstrain.selection import EpisodeFolds
@@ -28,10 +28,10 @@ from unconstrain.stream import (
     BATCH_ROWS,
     SAMPLE_ROWS,
     begin,
-    check_policy,
     finish,
     fold_of_samples,
-    open_source,
+    prepared,
+    tally_of,
 )
 
 PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
@@ -63,6 +63,10 @@ def fit(
     action: Keys | None = None,
     episode: Key | None = None,
     time: Key | None = None,
+    projections: Keys | None = None,
+    force: Keys | None = None,
+    force_threshold: float | None = None,
+    free: Key | None = None,
     time_unit: str | None = None,
     window: float = 0.2,
     gap: float | None = None,
@@ -86,21 +90,7 @@ def fit(
 
     All else as for `fit_stream`. Raises what it raises, and `UnconstrainError` where the cluster fails.
     """
-    check_policy(policy)
-    work: Policy = deepcopy(policy) if partial and hasattr(policy, "moments_") else clone(policy)
-    opened = open_source(
-        source,
-        batch_rows,
-        state=state,
-        action=action,
-        episode=episode,
-        time=time,
-        time_unit=time_unit,
-        window=window,
-        gap=gap,
-        max_speed=max_speed,
-        min_duration=min_duration,
-    )
+    work, opened = prepared(locals())
     if not isinstance(opened, Dataset):
         raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
     longest = begin(work, opened, sample_rows, random_state, partial=partial)
@@ -151,10 +141,12 @@ def connected(cluster: str, timeout: float = 10.0) -> Iterator[Any]:
 
 def divided(source: Dataset, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
     """The parts of a source, of `rows` rows or more, with the folds of their episodes, which are dealt out here."""
-    if isinstance(source.action, Derivation):
+    if source.needs_whole_episodes:
         bounds = list(_episode_starts(source, rows))
         for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):
-            yield Part(start, stop, None)
+            # Fragments of episodes that are differentiated are known, and dealt out, only once they are.
+            dealt = None if folds is None or source.differentiates else _folds_of(source, start, stop, folds)
+            yield Part(start, stop, dealt)
         return
     ends = np.cumsum([size for file in source.shards.row_groups for size in file])
     start = 0
@@ -183,13 +175,13 @@ def _episode_starts(source: Dataset, rows: int) -> Iterator[int]:
     current: Any = None
     ended: set[Any] = set()
     last = 0
-    for labels, start in source.labels(0, source.n_rows):
+    for labels, start in source.labels(0, source.n_rows, whole=True):
         firsts = np.flatnonzero(np.concatenate([[labels[0] != current], labels[1:] != labels[:-1]]))
         for at in firsts.tolist():
             if labels[at] in ended:
                 raise DataError(
                     f"{source.shards.shown}: episode {labels[at]} goes on at row {start + at} (counted from 0 over all "
-                    "files) after another began; to differentiate it, sort the data by episode"
+                    f"files) after another began; to {source.needs_whole_episodes} the data, sort them by episode"
                 )
             if current is not None:
                 ended.add(current)
@@ -257,7 +249,7 @@ def _sum_of_part(setup: tuple[Policy, Dataset, float], part: Part) -> Sum:
         for block in source.blocks(part.start, part.stop):
             samples = block.load()
             fold = fold_of_samples(policy, samples)
-            total += policy._tally(samples.states, samples.actions, fold, longest=longest)
+            total += tally_of(policy, samples, fold, longest)
     return Sum(total, len(policy.folds_.fold_of) - known if policy.alpha == "cv" else 0)
 
 

@@ -2,19 +2,20 @@
 
 Moments add, so the policy learnt from a stream is that learnt from all samples at once, given the same centres. Only
 where centres lie must be known before; they are placed on a random sample. Memory holds a few blocks, the moments,
-and, where the states are differentiated, the longest episode.
+and, where the states are differentiated or forces filtered, the longest episode.
 """
 
 import os
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from copy import deepcopy
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from sklearn.base import clone
 from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -28,6 +29,7 @@ from unconstrain.progress import Report, reporting
 from unconstrain.readers import dataset
 from unconstrain.readers.batches import Batches
 from unconstrain.readers.blocks import Block, Samples, Source
+from unconstrain.readers.reading import Reading
 from unconstrain.readers.roles import Keys
 from unconstrain.readers.table import Key
 from unconstrain.validation import check_samples
@@ -44,6 +46,10 @@ def fit_stream(
     action: Keys | None = None,
     episode: Key | None = None,
     time: Key | None = None,
+    projections: Keys | None = None,
+    force: Keys | None = None,
+    force_threshold: float | None = None,
+    free: Key | None = None,
     time_unit: str | None = None,
     window: float = 0.2,
     gap: float | None = None,
@@ -70,7 +76,8 @@ def fit_stream(
           ``s3://bucket/folder`` that `pyarrow.fs.FileSystem.from_uri` opens. Files come in the order of their names.
         - the folder of a LeRobot dataset, of version 2.0, 2.1 or 3.0. Its columns have known names, which are the
           defaults below.
-        - any iterable of `(X, U)` or `(X, U, groups)`: states (N, n), actions (N, d), episode labels (N,); or a
+        - any iterable of `(X, U)`, `(X, U, groups)` or `(X, U, groups, projections)`: states (N, n), actions (N, d),
+          episode labels (N,) or None, and what is known of the constraints, (N, d, d), NaN where nothing is; or a
           function that returns such an iterable, which can then be read more than once.
     state, action : column, or list of columns
         Of files, by name. A column of lists stands for all its components, of which `name[3]` is one; those of a
@@ -81,6 +88,14 @@ def fit_stream(
         file without it is cut into contiguous blocks, as `fit` does without groups.
     time, time_unit, window, gap, max_speed, min_duration
         For the derivative; see `load`. An episode may straddle files, but its rows must follow each other.
+    projections : column, or list of columns, optional
+        What is known of the constraints, for the risks "auto" and "constrained": a column of lists of d² numbers, the
+        projection row by row, as `save` writes it, or d² columns. Empty or NaN where it is not known.
+    force, force_threshold, free : columns, number, column, optional
+        What projections are made of instead, as by `load` and `constraints.from_recording`: contact forces, one column
+        for each action; above which a force is a contact, in their unit; and 1 where nothing constrained the motion,
+        else 0. Forces are filtered within whole episodes, so their rows must follow each other; without `episode`
+        those of a file are one.
     partial : bool
         Go on with a policy that is fitted already, as `partial_fit` does, instead of starting anew.
     checkpoint : path, optional
@@ -92,7 +107,8 @@ def fit_stream(
         How many samples are added up at a time.
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed: a random sample of the files'
-        rows (all of them, if there are no more), the first rows of an iterable.
+        rows (all of them, if there are no more), the first rows of an iterable; of these, those that move, unless
+        the risk is "direct" or "constrained".
     random_state : int
         Of that sample.
 
@@ -105,21 +121,7 @@ def fit_stream(
     UnconstrainError
         A checkpoint that belongs to something else or is damaged.
     """
-    check_policy(policy)
-    work: Policy = deepcopy(policy) if partial and hasattr(policy, "moments_") else clone(policy)
-    opened = open_source(
-        source,
-        batch_rows,
-        state=state,
-        action=action,
-        episode=episode,
-        time=time,
-        time_unit=time_unit,
-        window=window,
-        gap=gap,
-        max_speed=max_speed,
-        min_duration=min_duration,
-    )
+    work, opened = prepared(locals())
     settings = {"batch_rows": batch_rows, "sample_rows": sample_rows, "random_state": random_state}
     belongs_to: dict[str, str] = {}
     resumed = None
@@ -151,30 +153,39 @@ def fit_stream(
     return finish(policy, reached.policy, reached.tally)
 
 
-def check_policy(policy: Policy) -> None:
-    """Raise `PolicyError` for a policy that cannot be learnt from a stream."""
+def prepared(arguments: Mapping[str, Any]) -> tuple[Policy, Source]:
+    """The policy to go on with and the source, opened: what the arguments of `fit_stream` and `distributed.fit` say.
+
+    The policy is a copy. Raises `PolicyError` for one that cannot be learnt from this source.
+    """
+    policy = arguments["policy"]
     if not isinstance(policy, Policy):
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")
     policy._check_options()
-    if policy.risk == "constrained":
+    complete = policy.risk == "constrained"
+    source = _opened(arguments["source"], Reading.among(arguments), arguments["batch_rows"], complete)
+    if source.tells_constraints:
+        policy._check_uses_projections()
+    elif complete:
         raise PolicyError(
-            'risk="constrained" needs the projections of the samples, which streams do not carry: use partial_fit'
+            'risk="constrained" needs the projections of the samples: name columns with projections=, or with force= '
+            "and free=, or give batches (X, U, groups, projections)"
         )
+    goes_on = arguments["partial"] and hasattr(policy, "moments_")
+    return deepcopy(policy) if goes_on else clone(policy), source
 
 
-def open_source(source: Any, batch_rows: int, **columns: Any) -> Source:
-    """What `source` stands for; see `fit_stream`."""
+def _opened(source: Any, reading: Reading, batch_rows: int, complete: bool) -> Source:
     if isinstance(batch_rows, bool) or not isinstance(batch_rows, int | np.integer) or batch_rows < 1:
         raise PolicyError(f"batch_rows must be a whole number of at least 1, got {batch_rows!r}")
     several = (
         isinstance(source, list | tuple) and source and all(isinstance(s, str | os.PathLike) for s in source)
     )
     if isinstance(source, str | os.PathLike) or several:
-        return dataset.opened(source, batch_rows=batch_rows, **columns)
-    given = [name for name in ("state", "action", "episode", "time") if columns[name] is not None]
-    if given:
-        raise DataError(f"{given[0]}= chooses a column of files, but the source is not a path")
-    return Batches(source, batch_rows)
+        return dataset.opened(source, reading, batch_rows, complete=complete)
+    if reading.columns:
+        raise DataError(f"{reading.columns[0]}= chooses a column of files, but the source is not a path")
+    return Batches(source, batch_rows, complete=complete)
 
 
 def begin(
@@ -198,7 +209,7 @@ def begin(
             )
         return max(work.longest_action_, float(lengths.max(initial=0.0)))
     moves = risks.moving(U)
-    states = X[moves] if moves.any() and work.risk != "direct" else X
+    states = X[moves] if moves.any() and work.risk not in ("direct", "constrained") else X
     work._begin(states, U.shape[1], np.ones(len(states)), scalars=source.scalar_actions)
     return float(lengths.max(initial=0.0))
 
@@ -229,6 +240,12 @@ def fold_of_samples(policy: Policy, samples: Samples):
     if samples.groups is None:
         raise PolicyError('alpha="cv" over a stream needs episodes: give batches (X, U, groups)')
     return policy.folds_.assign(samples.groups, len(samples.states))
+
+
+def tally_of(policy: Policy, samples: Samples, fold: NDArray[Any] | None, longest: float) -> Tally:
+    """What samples add, by their fold (N,); see `Policy._tally`."""
+    known = samples.projections
+    return policy._tally(samples.states, samples.actions, fold, projections=known, longest=longest)
 
 
 class _Interrupted(Exception):
@@ -270,8 +287,8 @@ def _added_up(
         block, loaded = loading.popleft()
         samples = loaded.result()
         fold = fold_of_samples(policy, samples)
-        work = pool.submit(policy._tally, samples.states, samples.actions, fold, longest=start.longest)
-        adding.append((block, work))
+        added = pool.submit(tally_of, policy, samples, fold, start.longest)
+        adding.append((block, added))
 
     def add() -> None:
         nonlocal reached, kept

@@ -11,11 +11,16 @@ Array = NDArray[np.float64]
 
 
 class Samples(NamedTuple):
-    """States (N, n), actions (N, d), and episode labels (N,), None where nothing tells episodes apart."""
+    """States (N, n), actions (N, d), and what else is known of them.
+
+    groups: episode labels (N,), None where nothing tells episodes apart. projections: N (N, d, d), NaN where a sample's
+    constraint is not known, None where nothing tells of constraints.
+    """
 
     states: Array
     actions: Array
     groups: NDArray[Any] | None
+    projections: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,11 @@ class Source(Protocol):
     @property
     def scalar_actions(self) -> bool:
         """Whether the actions are of shape (N,)."""
+        ...
+
+    @property
+    def tells_constraints(self) -> bool:
+        """Whether samples come with projections."""
         ...
 
     def head(self) -> tuple[Array, Array | None]:

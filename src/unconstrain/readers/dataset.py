@@ -14,11 +14,12 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.readers import lerobot, saved
 from unconstrain.readers.blocks import Array, Block, Samples
+from unconstrain.readers.known import Known
 from unconstrain.readers.loading import NothingLeft, derived
-from unconstrain.readers.roles import Keys
+from unconstrain.readers.reading import Reading
 from unconstrain.readers.shards import Field, Paths, Piece, Shards
 from unconstrain.readers.stamps import seconds
-from unconstrain.readers.table import Column, Key, Table
+from unconstrain.readers.table import Column, Table
 from unconstrain.selection import EpisodeFolds
 
 DIFFERENTIATE = "differentiate"
@@ -43,7 +44,7 @@ class Dataset:
 
     action: fields, or how they are derived from the states. episode: the column that tells episodes apart; its values
     mean the same in all files, unless `restarts`. Without it every file is an episode; a single file then has none,
-    and contiguous blocks of it are what cross-validation leaves out.
+    and contiguous blocks of it are what cross-validation leaves out. known: the columns that tell of constraints.
     """
 
     shards: Shards
@@ -52,6 +53,7 @@ class Dataset:
     episode: str | None
     batch_rows: int
     restarts: bool = False
+    known: Known | None = None
 
     @property
     def repeatable(self) -> bool:
@@ -66,56 +68,75 @@ class Dataset:
         return self.shards.n_rows
 
     @property
+    def tells_constraints(self) -> bool:
+        return self.known is not None
+
+    @property
     def columns(self) -> list[str]:
         """The columns that are read, and no others are."""
-        if isinstance(self.action, Derivation):
-            used = [*(field.column for field in self.state), self.action.time]
-        else:
-            used = [field.column for field in (*self.state, *self.action)]
+        used = self._columns_of_samples
+        used += [self.action.time] if isinstance(self.action, Derivation) else []
+        used += self.known.columns if self.known else []
         return list(dict.fromkeys(used + ([self.episode] if self.episode else [])))
 
+    @property
+    def differentiates(self) -> bool:
+        return isinstance(self.action, Derivation)
+
+    @property
+    def needs_whole_episodes(self) -> str | None:
+        """What is done with a sample that takes its neighbours, where anything is."""
+        if self.differentiates:
+            return "differentiate"
+        return "filter the forces of" if self.known and self.known.of_whole_episodes else None
+
     def head(self) -> tuple[Array, Array | None]:
-        return self._plain(list(self.shards.pieces(self.columns, 0, HEAD_ROWS)))
+        return self._plain(list(self.shards.pieces(self._columns_of_samples, 0, HEAD_ROWS)))
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[Array, Array | None]:
-        return self._plain(self.shards.sample(self.columns, n_rows, random_state))
+        return self._plain(self.shards.sample(self._columns_of_samples, n_rows, random_state))
 
     def blocks(self, start: int = 0, stop: int | None = None) -> Generator[Block, None, None]:
         pieces = self.shards.pieces(self.columns, start, stop)
-        if isinstance(self.action, Derivation):
-            return self._whole_episodes(pieces, start, self.action)
-        return self._even(pieces, start)
+        return self._whole_episodes(pieces, start) if self.needs_whole_episodes else self._even(pieces, start)
 
     def identity(self) -> str:
         files = list(zip(map(os.path.basename, self.shards.paths), self.shards.row_groups, strict=True))
-        return repr((files, self.state, self.action, self.episode, self.restarts))
+        about = (files, self.state, self.action, self.episode, self.restarts)
+        return repr(about if self.known is None else (*about, self.known))
 
     def groups(self, pieces: list[Piece], start: int) -> NDArray[Any]:
-        """Episode labels (N,) of pieces, the first of which begins at row `start`."""
-        if self.episode is not None:
-            labels = self.shards.labels(pieces, self.episode)
-            if not self.restarts:
-                return labels
-            if labels.dtype.kind not in "iu":
-                raise DataError(f"{self.shards.shown}: the column {self.episode!r} must hold whole numbers")
-            return labels + (self._files(pieces) << 32)
-        if len(self.shards.paths) == 1 and not isinstance(self.action, Derivation):
+        """Labels (N,) of what cross-validation leaves out, of pieces the first of which begins at row `start`."""
+        if self.episode is None and len(self.shards.paths) == 1 and not isinstance(self.action, Derivation):
             rows = start + np.arange(sum(len(piece.rows) for piece in pieces))
             return rows * EpisodeFolds().n_folds // self.n_rows
-        return self._files(pieces)
+        return self.episodes(pieces)
 
-    def labels(self, start: int, stop: int) -> Iterator[tuple[NDArray[Any], int]]:
-        """The episode labels of rows `start` to `stop`, some at a time, each with the row where they begin.
+    def episodes(self, pieces: list[Piece]) -> NDArray[Any]:
+        """Episode labels (N,) of pieces: what is not torn apart where samples take their neighbours."""
+        if self.episode is None:
+            return np.repeat([piece.file for piece in pieces], [len(piece.rows) for piece in pieces])
+        labels = self.shards.labels(pieces, self.episode)
+        if not self.restarts:
+            return labels
+        if labels.dtype.kind not in "iu":
+            raise DataError(f"{self.shards.shown}: the column {self.episode!r} must hold whole numbers")
+        return labels + (replace(self, episode=None).episodes(pieces) << 32)
 
-        Nothing but the episode column is read.
+    def labels(self, start: int, stop: int, *, whole: bool = False) -> Iterator[tuple[NDArray[Any], int]]:
+        """The labels of rows `start` to `stop`, some at a time, each with the row where they begin.
+
+        They are those of `groups`, or with `whole` those of `episodes`. Nothing but the episode column is read.
         """
         column = self.episode or self.state[0].column
         for piece in self.shards.pieces([column], start, stop):
-            yield self.groups([piece], start), start
+            yield self.episodes([piece]) if whole else self.groups([piece], start), start
             start += len(piece.rows)
 
-    def _files(self, pieces: list[Piece]) -> NDArray[np.int64]:
-        return np.repeat([piece.file for piece in pieces], [len(piece.rows) for piece in pieces])
+    @property
+    def _columns_of_samples(self) -> list[str]:
+        given = () if isinstance(self.action, Derivation) else self.action
+        return list(dict.fromkeys(field.column for field in (*self.state, *given)))
 
     def _plain(self, pieces: list[Piece]) -> tuple[Array, Array | None]:
         if isinstance(self.action, Derivation):
@@ -142,27 +163,36 @@ class Dataset:
             yield Block(start, start + count, partial(self._loaded, waiting, start))
 
     def _loaded(self, pieces: list[Piece], start: int) -> Samples:
+        if isinstance(self.action, Derivation):
+            return self._derived(pieces, start, self.action)
         X, U = self._plain(pieces)
         assert U is not None
-        return Samples(X, U, self.groups(pieces, start))
+        groups = self.groups(pieces, start)
+        if self.known is None:
+            return Samples(X, U, groups)
+        codes = _runs(self.episodes(pieces))[0]
+        demos = Demonstrations(X, U, codes, **self.known.told(self.shards, pieces))
+        return Samples(X, U, groups, self._projections(demos, pieces))
 
-    def _whole_episodes(
-        self, pieces: Iterator[Piece], start: int, how: Derivation
-    ) -> Generator[Block, None, None]:
-        """Blocks of whole episodes, of `batch_rows` rows or more: a derivative needs its neighbours."""
+    def _projections(self, demos: Demonstrations, pieces: list[Piece]) -> Array | None:
+        return None if self.known is None else self.known.of(demos, self.shards.name(pieces[0].file))
+
+    def _whole_episodes(self, pieces: Iterator[Piece], start: int) -> Generator[Block, None, None]:
+        """Blocks of whole episodes, of `batch_rows` rows or more."""
         waiting: list[Piece] = []
         count = 0  # rows waiting
         current: Any = None
         ended: set[Any] = set()
         for piece in pieces:
-            labels = self.groups([piece], start)
+            labels = self.episodes([piece])
             changes = (np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist()
             used = 0  # of the piece
             for at in changes if labels[0] == current else [0, *changes]:
                 if labels[at] in ended:
                     raise DataError(
                         f"{self.shards.name(piece.file)}: episode {labels[at]} goes on at row {piece.first + at} "
-                        "(counted from 0) after another began; to differentiate a stream, sort it by episode"
+                        f"(counted from 0) after another began; to {self.needs_whole_episodes} a stream, sort it by "
+                        "episode"
                     )
                 if current is not None:
                     ended.add(current)
@@ -170,18 +200,17 @@ class Dataset:
                 complete = count + at - used  # rows of episodes that have ended
                 if complete >= self.batch_rows:
                     block = [*waiting, piece.slice(used, at - used)] if at > used else waiting
-                    yield Block(start, start + complete, partial(self._derived, block, start, how))
+                    yield Block(start, start + complete, partial(self._loaded, block, start))
                     waiting, count, start, used = [], 0, start + complete, at
             waiting.append(piece.slice(used, len(piece.rows) - used))
             count += len(piece.rows) - used
         if waiting:
-            yield Block(start, start + count, partial(self._derived, waiting, start, how))
+            yield Block(start, start + count, partial(self._loaded, waiting, start))
 
     def _derived(self, pieces: list[Piece], start: int, how: Derivation) -> Samples:
         X = self.shards.numbers(pieces, self.state, "state").T
-        labels = self.groups(pieces, start)
-        begins = np.concatenate([[True], labels[1:] != labels[:-1]])
-        codes = np.cumsum(begins) - 1
+        labels = self.episodes(pieces)
+        codes, begins = _runs(labels)
         stamps = self._stamps(pieces, codes, how)
         demos = Demonstrations(
             np.ascontiguousarray(X),
@@ -189,14 +218,17 @@ class Dataset:
             codes,
             stamps,
             episode_labels=[str(label) for label in labels[begins]],
+            **(self.known.told(self.shards, pieces) if self.known else {}),
         )
         limits = {"gap": how.gap, "max_speed": how.max_speed, "min_duration": how.min_duration}
         try:
             demos = derived(demos, self.shards.name(pieces[0].file), window=how.window, **limits)
         except NothingLeft:  # of this block, which is no more than a part of the recording
-            return Samples(X[:0], X[:0], labels[:0])
+            nothing = np.zeros((0, X.shape[1], X.shape[1])) if self.known else None
+            return Samples(X[:0], X[:0], labels[:0], nothing)
         # A fragment of a broken episode is an episode of its own; counted from its block's first row, none is twice.
-        return Samples(demos.states, demos.actions, start + demos.episodes)
+        groups = start + demos.episodes
+        return Samples(demos.states, demos.actions, groups, self._projections(demos, pieces))
 
     def _stamps(self, pieces: list[Piece], codes: NDArray[np.int64], how: Derivation) -> Array:
         columns = [self.shards.table(piece, [how.time]).columns[0].values for piece in pieces]
@@ -214,19 +246,14 @@ class Dataset:
         return seconds(table, 0, codes, how.time_unit)[0]
 
 
-def opened(
-    source: Paths,
-    state: Keys | None,
-    action: Keys | None,
-    episode: Key | None,
-    time: Key | None,
-    batch_rows: int,
-    **derivation: Any,
-) -> Dataset:
+def opened(source: Paths, reading: Reading, batch_rows: int, *, complete: bool = False) -> Dataset:
     """The files of `source` with their columns in their roles; see `fit_stream` for what may be given.
+
+    complete: whether the constraint of every sample has to be known, where columns tell of it.
 
     Raises `DataError` for files that cannot be read, and columns that do not exist or are not given.
     """
+    state, action, episode, time = reading.state, reading.action, reading.episode, reading.time
     robot = lerobot.opened(source) if isinstance(source, str | os.PathLike) else None
     shards = robot.shards if robot else Shards.find(source)
     table, schema = shards.first_rows()
@@ -249,23 +276,36 @@ def opened(
         raise DataError(
             f"{shards.shown}: give action=, or time= so that the states can be differentiated; {table.listing()}"
         )
-    found = Dataset(
+    states = fields("state", state)
+    actions: tuple[Field, ...] | Derivation
+    if differentiated:
+        n_actions = len(states)
+        assert time is not None
+        actions = Derivation(
+            _whole_column(table, "time", time),
+            reading.time_unit,
+            reading.window,
+            reading.gap,
+            reading.max_speed,
+            reading.min_duration,
+        )
+    else:
+        actions = fields("action", action)
+        n_actions = len(actions)
+    return Dataset(
         shards,
-        fields("state", state),
-        () if differentiated else fields("action", action),
+        states,
+        actions,
         None if episode is None else _whole_column(table, "episode", episode),
         batch_rows,
         restarts,
+        Known.asked(reading, fields, schema, n_actions, complete),
     )
-    if not differentiated:
-        return found
-    assert time is not None
-    return replace(found, action=Derivation(_whole_column(table, "time", time), **derivation))
 
 
 def _fields(table: Table, robot: lerobot.LeRobot | None, role: str, keys: Any) -> tuple[Field, ...]:
     each = [keys] if isinstance(keys, str | int) else list(keys)
-    own = {"state": lerobot.STATE, "action": lerobot.ACTION}[role]
+    own = {"state": lerobot.STATE, "action": lerobot.ACTION}.get(role, role)
     names = robot.component_names(own) if robot else []
     known = {column.name for column in table.columns} | {column.part_of for column in table.columns}
     fields: list[Field] = []
@@ -279,6 +319,12 @@ def _fields(table: Table, robot: lerobot.LeRobot | None, role: str, keys: Any) -
     if not fields:
         raise DataError(f"no {role} columns were given for {table.path}; {table.listing()}")
     return tuple(fields)
+
+
+def _runs(labels: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Numbers (N,) of the runs of equal labels, from 0, and where they begin, as a mask (N,)."""
+    begins = np.concatenate([[True], labels[1:] != labels[:-1]])
+    return np.cumsum(begins) - 1, begins
 
 
 def _whole_column(table: Table, role: str, key: Any) -> str:

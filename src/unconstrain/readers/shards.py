@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.fs
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
@@ -24,7 +25,6 @@ Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
 SUFFIXES = (".parquet", ".pq")
 DECODED = 65536  # rows decoded at a time: what a processor's cache holds of a few columns
-BUFFER = 1 << 20  # bytes read ahead of each column, on disk; object stores get whole row groups at once
 SAMPLED_GROUPS = (
     16  # row groups, at least, that a sample is drawn from: neighbouring rows resemble each other
 )
@@ -131,12 +131,15 @@ class Shards:
                 at += len(piece.rows)
         return sampled
 
-    def numbers(self, pieces: Sequence[Piece], fields: Sequence[Field], role: str) -> Array:
-        """These fields as finite float64, (k, N): a row a field, as columns are stored.
+    def numbers(self, pieces: Sequence[Piece], fields: Sequence[Field], role: str) -> NDArray[Any]:
+        """These fields as finite numbers, (k, N): a row a field, as columns are stored.
 
+        float32 where the files hold nothing else, half of what is moved about then; float64 otherwise.
         Raises `DataError` that names file, column and row of whatever is not a number.
         """
-        numbers = np.empty((len(fields), sum(len(piece.rows) for piece in pieces)))
+        shape = (len(fields), sum(len(piece.rows) for piece in pieces))
+        single = all(_single(self._column(piece, field.column).type) for piece in pieces for field in fields)
+        numbers: NDArray[Any] = np.empty(shape, np.float32 if single else np.float64)
         columns: dict[str, list[tuple[int, int | None]]] = {}
         for i, field in enumerate(fields):
             columns.setdefault(field.column, []).append((i, field.component))
@@ -167,13 +170,46 @@ class Shards:
             parts.append(values.to_numpy(zero_copy_only=False))
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
+    def sparse(self, piece: Piece, columns: Sequence[str], width: int) -> Array:
+        """`width` numbers a row, (N, width), of one column of lists or as many columns; NaN where they are missing.
+
+        Raises `DataError` that names file, column and row of a list of another length.
+        """
+        numbers = np.full((len(piece.rows), width), np.nan)
+        for i, column in enumerate(columns):
+            values = self._column(piece, column)
+            rows = slice(None)
+            if pa.types.is_nested(values.type) and hasattr(values, "flatten"):
+                lengths = pc.fill_null(pc.list_value_length(values), width).to_numpy()
+                if np.any(lengths != width):
+                    at = int(np.argmax(lengths != width))
+                    raise DataError(
+                        f"{self.name(piece.file)}: column {column!r} holds a list of {lengths[at]} at "
+                        f"{row(piece.first + at)} where {width} numbers are needed"
+                    )
+                rows, values = values.is_valid().to_numpy(zero_copy_only=False), values.flatten()
+            kind = values.type
+            if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)):
+                raise DataError(
+                    f"{self.name(piece.file)}: column {column!r} holds {kind} values where numbers are needed; choose "
+                    "other columns"
+                )
+            plain = values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+            if len(columns) == 1:
+                numbers[rows] = plain.reshape(-1, width)
+            else:
+                numbers[rows, i] = plain
+        return numbers
+
     def table(self, piece: Piece, columns: Sequence[str]) -> Table:
         """A piece as the readers know tables, whose errors name the row in the file."""
         arrays = [self._column(piece, column) for column in columns]
         table = pa.Table.from_arrays(arrays, names=list(columns))
         return columns_of(table, self.name(piece.file), lambda index: row(piece.first + index))
 
-    def _fill(self, numbers: Array, piece: Piece, column: str, places: list[tuple[int, int | None]]) -> bool:
+    def _fill(
+        self, numbers: NDArray[Any], piece: Piece, column: str, places: list[tuple[int, int | None]]
+    ) -> bool:
         """Write a column's components into their rows of `numbers`; False if anything about them is unusual."""
         values = self._column(piece, column)
         if values.null_count:
@@ -201,7 +237,12 @@ class Shards:
         return all(np.dot(numbers[i], numbers[i]) < 1e300 for i, _ in places)
 
     def _fill_slowly(
-        self, numbers: Array, piece: Piece, column: str, places: list[tuple[int, int | None]], role: str
+        self,
+        numbers: NDArray[Any],
+        piece: Piece,
+        column: str,
+        places: list[tuple[int, int | None]],
+        role: str,
     ) -> None:
         table = self.table(piece, [column])
         for i, component in places:
@@ -247,14 +288,10 @@ class Shards:
             return tuple(metadata.row_group(g).num_rows for g in range(metadata.num_row_groups))
 
     def _open(self, path: str) -> Any:
+        # What is mapped is not copied before it is decoded; object stores get whole row groups at once.
         local = isinstance(self.filesystem, pyarrow.fs.LocalFileSystem)
-        return pq.ParquetFile(
-            path,
-            filesystem=self.filesystem,
-            pre_buffer=not local,
-            buffer_size=BUFFER if local else 0,
-            page_checksum_verification=True,
-        )
+        where: dict[str, Any] = {"memory_map": True} if local else {"filesystem": self.filesystem}
+        return pq.ParquetFile(path, pre_buffer=not local, page_checksum_verification=True, **where)
 
 
 class _NamedErrors:
@@ -274,6 +311,12 @@ class _NamedErrors:
         if isinstance(error, FileNotFoundError | PermissionError):
             raise DataError(f"{self.shown} cannot be read: {error.strerror or error}") from error
         raise DataError(f"{self.shown} is damaged or not a Parquet file; write it again") from error
+
+
+def _single(kind: pa.DataType) -> bool:
+    return pa.types.is_float32(
+        kind.value_type if pa.types.is_nested(kind) and hasattr(kind, "value_type") else kind
+    )
 
 
 def _located(source: Paths) -> tuple[Any, list[str], str]:

@@ -7,6 +7,7 @@ import pytest
 from sklearn.preprocessing import FunctionTransformer
 
 import recordings
+import test_stream_known as known
 import unconstrain as uc
 from test_stream import COLUMNS, EPISODES, ROLES, TIME, U, X, assert_same_fit, policies, spoilt
 from unconstrain import distributed
@@ -61,6 +62,36 @@ def test_episodes_known_by_their_files(tmp_path, client):
         assert_same_fit(policy, whole)
 
 
+@pytest.mark.parametrize("part_rows", [45, 10_000])
+@pytest.mark.parametrize("derived", [False, True])
+@pytest.mark.parametrize("way", ["force and free", "free", "lists"])
+def test_what_is_known_of_constraints_goes_along(tmp_path, client, way, derived, part_rows):
+    folder = recordings.write(
+        tmp_path / "parts", X, U, EPISODES, TIME, [100, 101, 333], more=known.TOUCHED, row_group_size=40
+    )
+    columns = COLUMNS | ({"action": None, "time": "timestamp"} if derived else {}) | known.WAYS[way]
+    whole = fit_stream(known.policies()[1], folder, **columns, batch_rows=10_000)
+    policy = distributed.fit(
+        known.policies()[1], folder, client, **columns, part_rows=part_rows, batch_rows=30
+    )
+    known.assert_same_known(policy, whole)
+    assert len(policy.folds_.fold_of) == len(whole.folds_.fold_of)
+    if not derived:
+        assert policy.folds_.fold_of == whole.folds_.fold_of
+
+
+@pytest.mark.parametrize("cuts", [[], [100, 250, 400]])
+def test_forces_of_a_file_stay_together_where_files_are_episodes(tmp_path, client, cuts):
+    columns = {name: COLUMNS[name] for name in ("state", "action")} | known.FORCE
+    folder = recordings.write(
+        tmp_path / "parts", X, U, EPISODES, TIME, cuts, more=known.TOUCHED, row_group_size=64
+    )
+    whole = fit_stream(uc.ParametricPolicy(alpha="cv"), folder, **columns)
+    policy = distributed.fit(uc.ParametricPolicy(alpha="cv"), folder, client, **columns, part_rows=100)
+    known.assert_same_known(policy, whole)
+    assert len(policy.folds_.fold_of) == (len(cuts) + 1 if cuts else 5)
+
+
 def test_what_counts_as_motion_does_not_depend_on_the_parts(tmp_path, client):
     actions = U.copy()
     actions[:200] = np.where(np.arange(200)[:, None] % 2, 1e-9, 1e-17)
@@ -112,6 +143,22 @@ def test_broken_parts_are_named(tmp_path, client, how, sentence):
         distributed.fit(policy, spoilt(tmp_path / "parts", how), client, **COLUMNS, part_rows=50)
     assert "\n" not in str(caught.value)
     assert not hasattr(policy, "moments_")
+
+
+def test_mistakes_about_constraints_are_told_in_one_sentence(tmp_path, client):
+    episodes = EPISODES.copy()
+    episodes[-10:] = episodes[0]
+    folder = recordings.write(tmp_path / "parts", X, U, episodes, TIME, [], more=known.TOUCHED)
+    for risk, options, sentence in (
+        ("auto", known.FORCE, "after another began; to filter the forces of the data, sort them by episode"),
+        ("constrained", {}, 'risk="constrained" needs the projections'),
+        ("constrained", known.WAYS["lists"], r"the projection at row \d+ .* is not known"),
+        ("direct", known.WAYS["lists"], "projections are for risk"),
+    ):
+        policy = uc.ParametricPolicy(risk=risk)
+        with pytest.raises(uc.errors.UnconstrainError, match=sentence):
+            distributed.fit(policy, folder, client, **COLUMNS, **options, part_rows=50)
+        assert not hasattr(policy, "moments_")
 
 
 def test_mistakes_are_told_in_one_sentence(client, monkeypatch):

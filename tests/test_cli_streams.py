@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import recordings
+import test_stream_known as known
 import unconstrain as uc
 from test_cli import run  # noqa: F401 - a fixture
 from test_stream import EPISODES, TIME, U, X, assert_same_fit
@@ -12,6 +13,11 @@ COLUMNS = ("--state", "x0,x1,x2", "--action", "u0,u1,u2", "--episode", "episode_
 @pytest.fixture
 def folder(tmp_path):
     return recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, [100, 333]).name
+
+
+@pytest.fixture
+def touched(tmp_path):
+    return recordings.write(tmp_path / "felt", X, U, EPISODES, TIME, [], more=known.TOUCHED).name
 
 
 def test_a_folder_is_read_as_a_stream(run, folder):  # noqa: F811
@@ -37,6 +43,30 @@ def test_a_cluster_of_this_machine(run, folder):  # noqa: F811
     )
 
 
+@pytest.mark.parametrize("where", [(), ("--checkpoint", "run.npz"), ("--cluster", "local")])
+def test_what_is_known_of_constraints_is_used(run, touched, where):  # noqa: F811
+    if "--cluster" in where:
+        pytest.importorskip("distributed")
+    options = ("--force", "f0,f1,f2", "--force-threshold", 2, "--free", "free")
+    code, out, err = run("fit", touched, *COLUMNS, "--model", "linear", *options, *where)
+    assert code == 0, err
+    whole = known.in_memory(
+        uc.ParametricPolicy(alpha="cv"), f"{touched}/part-0.parquet", known.COLUMNS, "force and free"
+    )[0]
+    assert f"constraints: known of {whole.n_known_constraints_ / len(X):.1%} of the samples" in out
+    known.assert_same_known(uc.load_policy("policy.skops"), whole)
+
+
+def test_files_that_uc_save_wrote_need_no_more_than_the_columns_that_tell(run, tmp_path):  # noqa: F811
+    demos = uc.Demonstrations(X, U, EPISODES, free=known.TOUCHED["free"])
+    (tmp_path / "saved").mkdir()
+    uc.save(demos, tmp_path / "saved" / "a.parquet")
+    code, out, err = run("fit", "saved", "--model", "linear", "--free", "free")
+    assert code == 0, err
+    assert f"constraints: known of {demos.free.mean():.1%} of the samples" in out
+    assert uc.load_policy("policy.skops").risk == "auto"
+
+
 def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):  # noqa: F811
     tally, calls = uc.ParametricPolicy._tally, []
 
@@ -59,6 +89,10 @@ def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):  # noqa: F811
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
+        (("--force", "f0,f1,f2"), "--force needs --force-threshold"),
+        (("--free", "u9"), "no column 'u9' for free"),
+        (("--free", "x0", "--risk", "direct"), "leave out --risk direct, or --force and --free"),
+        (("--free", "x0", "--model", "auto"), "--model auto needs all data in memory"),
         (("--figure", "a.png"), "--figure needs all data in memory"),
         (("--min-speed", "0.1"), "--min-speed needs all data in memory"),
         (("--model", "auto"), "--model auto needs all data in memory"),

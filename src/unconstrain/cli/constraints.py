@@ -47,6 +47,7 @@ Figure = Annotated[
 
 
 def constraints(
+    context: typer.Context,
     files: Files,
     state: State = None,
     action: Action = None,
@@ -73,18 +74,7 @@ def constraints(
     check_choice(model, "--model", MODELS)
     if n_centers is not None and model != "rbf":
         raise PolicyError(f"--n-centers is for --model rbf, and this is {model}")
-    how = recordings.asked(
-        state,
-        action,
-        time,
-        episode,
-        time_unit=time_unit,
-        window=window,
-        gap=gap,
-        max_speed=max_speed,
-        min_speed=min_speed,
-        min_duration=min_duration,
-    )
+    how = recordings.asked(context.params)
     estimator = _estimator(model, rows, 10 if n_centers is None else n_centers)
     console = reporting.console()
     with console.status("reading"):

@@ -31,6 +31,7 @@ CHOICES = tuple(name for name in models.MODELS if name != "auto")
 
 
 def diagnose(
+    context: typer.Context,
     files: Files,
     state: State = None,
     action: Action = None,
@@ -67,18 +68,7 @@ def diagnose(
     check_choice(model, "--model", models.MODELS)
     if model == "auto":
         raise PolicyError(f"diagnose is about one model: choose --model {' or '.join(CHOICES)}")
-    how = recordings.asked(
-        state,
-        action,
-        time,
-        episode,
-        time_unit=time_unit,
-        window=window,
-        gap=gap,
-        max_speed=max_speed,
-        min_speed=min_speed,
-        min_duration=min_duration,
-    )
+    how = recordings.asked(context.params)
     policy = models.build(model, alpha=models.decay(alpha), centers=centers, n_centers=n_centers, width=width)
     console = reporting.console()
     with console.status("reading"):

@@ -28,6 +28,7 @@ from unconstrain.policies import load_policy
 
 
 def evaluate(
+    context: typer.Context,
     policy: Annotated[Path, typer.Argument(help="A policy saved by `unconstrain fit`.", metavar="POLICY")],
     files: Files,
     state: State = None,
@@ -46,18 +47,7 @@ def evaluate(
     They are read as those it was learnt from, unless an option says otherwise; --state names all columns anew.
     """
     learnt = load_policy(policy)
-    how = recordings.asked(
-        state,
-        action,
-        time,
-        episode,
-        time_unit=time_unit,
-        window=window,
-        gap=gap,
-        max_speed=max_speed,
-        min_speed=min_speed,
-        min_duration=min_duration,
-    )
+    how = recordings.asked(context.params)
     how = recordings.as_before(getattr(learnt, "recording_", {}), how)
     console = reporting.console()
     demos = recordings.read(files, how)

@@ -72,6 +72,7 @@ Figure = Annotated[
 
 
 def fit(
+    context: typer.Context,
     files: Files,
     state: State = None,
     action: Action = None,
@@ -109,32 +110,22 @@ def fit(
     if folds is not None:
         check_choice(folds, "--folds", FOLDS)
     _check_known(force, force_threshold, free, risk)
-    how = recordings.asked(
-        state,
-        action,
-        time,
-        episode,
-        time_unit=time_unit,
-        window=window,
-        gap=gap,
-        max_speed=max_speed,
-        min_speed=min_speed,
-        min_duration=min_duration,
-    )
+    how, told = recordings.asked(context.params), recordings.told(context.params)
     named = _candidates(
         model, risk=risk, alpha=models.decay(alpha), centers=centers, n_centers=n_centers, width=width
     )
+    if told:
+        risk = "auto"
+        named = named and {name: policy.set_params(risk=risk) for name, policy in named.items()}
     console = reporting.console()
     if streams.is_meant(files, checkpoint, cluster):
-        if force is not None or free is not None:
-            raise PolicyError(
-                "streams are learnt without constraints: leave out --force and --free, or fit files at once"
-            )
+        if force_threshold is not None:
+            told["force_threshold"] = force_threshold
         streamed = streams.learn(
             console,
             named[model] if named else None,
             files,
-            how,
+            how | told,
             checkpoint,
             cluster,
             figure=figure,
@@ -145,17 +136,13 @@ def fit(
         console.print(f"policy: {out}")
         return
     with console.status("reading"):
-        felt = {"force": recordings.columns(force), "free": recordings.one_column(free, "--free")}
-        demos = recordings.read(
-            files, how | {name: given for name, given in felt.items() if given is not None}
-        )
+        demos = recordings.read(files, how | told)
     describe(console, demos)
     groups = folds_of(demos, folds)
     known = None
-    if force is not None or free is not None:
-        known, risk = from_recording(demos, force_threshold=force_threshold), "auto"
+    if told:
+        known = from_recording(demos, force_threshold=force_threshold)
         _describe_known(console, known)
-        named = named and {name: clone(policy).set_params(risk=risk) for name, policy in named.items()}
 
     chosen, table = _compare(console, demos, groups, model, named, risk, known)
     policy = table.policies[chosen]

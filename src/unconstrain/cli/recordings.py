@@ -1,5 +1,6 @@
 """Options that say which recordings, and which of their columns; shared by the commands that read files."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -52,6 +53,9 @@ MinDuration = Annotated[
     typer.Option("--min-duration", help="Drop fragments of split episodes shorter than this (s)."),
 ]
 
+PLAIN = ("time_unit", "window", "gap", "max_speed", "min_speed", "min_duration")
+"""Options that `load` takes as they are."""
+
 
 def columns(text: str | None) -> list[str | int] | None:
     """`"x,y"` as names, `"1,2"` as positions. Raises `DataError` for an empty name."""
@@ -73,22 +77,30 @@ def one_column(text: str | None, option: str) -> str | int | None:
     return named[0]
 
 
-def asked(
-    state: str | None,
-    action: str | None,
-    time: str | None,
-    episode: str | None,
-    **options: Any,
-) -> dict[str, Any]:
-    """The arguments of `load` that were given, in a form that can be kept with a policy."""
-    given = {
-        "state": columns(state),
-        "action": columns(action),
-        "time": one_column(time, "--time"),
-        "episode": one_column(episode, "--episode"),
-        **options,
-    }
-    return {name: value for name, value in given.items() if value is not None}
+def asked(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of `load` among a command's options (`typer.Context.params`), those that were given.
+
+    Without what tells of constraints, so that they can be kept with a policy, and other recordings read by them.
+    """
+    return _given(
+        {
+            "state": columns(options["state"]),
+            "action": columns(options["action"]),
+            "time": one_column(options["time"], "--time"),
+            "episode": one_column(options["episode"], "--episode"),
+            **{name: options[name] for name in PLAIN},
+        }
+    )
+
+
+def told(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns that tell of constraints among a command's options, those that were given."""
+    force, free = columns(options["force"]), one_column(options["free"], "--free")
+    return _given({"force": force, "free": free})
+
+
+def _given(options: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def as_before(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:

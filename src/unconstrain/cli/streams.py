@@ -72,6 +72,9 @@ def _describe(console: Console, policy: Policy) -> None:
     folds = getattr(policy, "folds_", None)
     episodes = f" in {len(folds.fold_of):,} episodes" if folds is not None else ""
     console.print(f"read: {policy.n_samples_seen_:,} samples{episodes}")
+    if policy.risk == "auto":
+        share = policy.n_known_constraints_ / policy.n_samples_seen_
+        console.print(f"constraints: known of {share:.1%} of the samples")
     console.print(f"zero actions: {policy.n_zero_actions_:,} without a direction")
     if not hasattr(policy, "held_out_risk_"):
         return

@@ -10,19 +10,6 @@ from rich.console import Console
 from unconstrain import constraint_figures, figures, risk
 from unconstrain.cli import recordings, reporting
 from unconstrain.cli.fit import describe, folds_of
-from unconstrain.cli.recordings import (
-    Action,
-    Episode,
-    Files,
-    Gap,
-    MaxSpeed,
-    MinDuration,
-    MinSpeed,
-    State,
-    Time,
-    Window,
-)
-from unconstrain.cli.recordings import TimeUnit as Unit
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import NormalizedRBF
@@ -48,22 +35,22 @@ Figure = Annotated[
 
 def constraints(
     context: typer.Context,
-    files: Files,
-    state: State = None,
-    action: Action = None,
-    time: Time = None,
-    episode: Episode = None,
+    files: recordings.Files,
+    state: recordings.State = None,
+    action: recordings.Action = None,
+    time: recordings.Time = None,
+    episode: recordings.Episode = None,
     model: Model = "constant",
     rows: Rows = None,
     n_centers: NCenters = None,
     out: Out = Path("constraint.skops"),
     figure: Figure = None,
-    time_unit: Unit = None,
-    window: Window = None,
-    gap: Gap = None,
-    max_speed: MaxSpeed = None,
-    min_speed: MinSpeed = None,
-    min_duration: MinDuration = None,
+    time_unit: recordings.TimeUnit = None,
+    window: recordings.Window = None,
+    gap: recordings.Gap = None,
+    max_speed: recordings.MaxSpeed = None,
+    min_speed: recordings.MinSpeed = None,
+    min_duration: recordings.MinDuration = None,
 ) -> None:
     """Find the constraint that recordings moved under: rows A with A u = 0.
 

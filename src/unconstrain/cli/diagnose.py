@@ -8,19 +8,6 @@ import typer
 from unconstrain import figures
 from unconstrain.cli import models, recordings, reporting
 from unconstrain.cli.fit import Alpha, Centers, Folds, NCenters, Width, describe, folds_of
-from unconstrain.cli.recordings import (
-    Action,
-    Episode,
-    Files,
-    Gap,
-    MaxSpeed,
-    MinDuration,
-    MinSpeed,
-    State,
-    Time,
-    Window,
-)
-from unconstrain.cli.recordings import TimeUnit as Unit
 from unconstrain.errors import PolicyError
 from unconstrain.identifiability import identifiability
 from unconstrain.identifiability.pictures import drawn
@@ -32,11 +19,11 @@ CHOICES = tuple(name for name in models.MODELS if name != "auto")
 
 def diagnose(
     context: typer.Context,
-    files: Files,
-    state: State = None,
-    action: Action = None,
-    time: Time = None,
-    episode: Episode = None,
+    files: recordings.Files,
+    state: recordings.State = None,
+    action: recordings.Action = None,
+    time: recordings.Time = None,
+    episode: recordings.Episode = None,
     model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(CHOICES)}.")] = "locally-linear",
     alpha: Alpha = "cv",
     centers: Centers = None,
@@ -52,12 +39,12 @@ def diagnose(
     figure: Annotated[
         Path | None, typer.Option("--figure", help="Draw how far the policy is determined (PNG, SVG, PDF).")
     ] = None,
-    time_unit: Unit = None,
-    window: Window = None,
-    gap: Gap = None,
-    max_speed: MaxSpeed = None,
-    min_speed: MinSpeed = None,
-    min_duration: MinDuration = None,
+    time_unit: recordings.TimeUnit = None,
+    window: recordings.Window = None,
+    gap: recordings.Gap = None,
+    max_speed: recordings.MaxSpeed = None,
+    min_speed: recordings.MinSpeed = None,
+    min_duration: recordings.MinDuration = None,
 ) -> None:
     """Say how far recordings determine the policy, where they do not, and what to record next.
 

@@ -10,19 +10,6 @@ from rich.table import Table
 from unconstrain import risk, selection
 from unconstrain.cli import recordings, reporting
 from unconstrain.cli.fit import describe
-from unconstrain.cli.recordings import (
-    Action,
-    Episode,
-    Files,
-    Gap,
-    MaxSpeed,
-    MinDuration,
-    MinSpeed,
-    State,
-    Time,
-    Window,
-)
-from unconstrain.cli.recordings import TimeUnit as Unit
 from unconstrain.errors import DataError
 from unconstrain.policies import load_policy
 
@@ -30,17 +17,17 @@ from unconstrain.policies import load_policy
 def evaluate(
     context: typer.Context,
     policy: Annotated[Path, typer.Argument(help="A policy saved by `unconstrain fit`.", metavar="POLICY")],
-    files: Files,
-    state: State = None,
-    action: Action = None,
-    time: Time = None,
-    episode: Episode = None,
-    time_unit: Unit = None,
-    window: Window = None,
-    gap: Gap = None,
-    max_speed: MaxSpeed = None,
-    min_speed: MinSpeed = None,
-    min_duration: MinDuration = None,
+    files: recordings.Files,
+    state: recordings.State = None,
+    action: recordings.Action = None,
+    time: recordings.Time = None,
+    episode: recordings.Episode = None,
+    time_unit: recordings.TimeUnit = None,
+    window: recordings.Window = None,
+    gap: recordings.Gap = None,
+    max_speed: recordings.MaxSpeed = None,
+    min_speed: recordings.MinSpeed = None,
+    min_duration: recordings.MinDuration = None,
 ) -> None:
     """Hold a saved policy against other recordings.
 

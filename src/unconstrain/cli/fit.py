@@ -11,19 +11,6 @@ from sklearn.base import clone
 
 from unconstrain import comparison, figures
 from unconstrain.cli import models, recordings, reporting, streams
-from unconstrain.cli.recordings import (
-    Action,
-    Episode,
-    Files,
-    Gap,
-    MaxSpeed,
-    MinDuration,
-    MinSpeed,
-    State,
-    Time,
-    Window,
-)
-from unconstrain.cli.recordings import TimeUnit as Unit
 from unconstrain.cli.reporting import quoted
 from unconstrain.constraints import from_recording
 from unconstrain.demonstrations import Demonstrations
@@ -73,11 +60,11 @@ Figure = Annotated[
 
 def fit(
     context: typer.Context,
-    files: Files,
-    state: State = None,
-    action: Action = None,
-    time: Time = None,
-    episode: Episode = None,
+    files: recordings.Files,
+    state: recordings.State = None,
+    action: recordings.Action = None,
+    time: recordings.Time = None,
+    episode: recordings.Episode = None,
     model: Model = "locally-linear",
     out: Out = Path("policy.skops"),
     figure: Figure = None,
@@ -90,12 +77,12 @@ def fit(
     force: Force = None,
     force_threshold: ForceThreshold = None,
     free: Free = None,
-    time_unit: Unit = None,
-    window: Window = None,
-    gap: Gap = None,
-    max_speed: MaxSpeed = None,
-    min_speed: MinSpeed = None,
-    min_duration: MinDuration = None,
+    time_unit: recordings.TimeUnit = None,
+    window: recordings.Window = None,
+    gap: recordings.Gap = None,
+    max_speed: recordings.MaxSpeed = None,
+    min_speed: recordings.MinSpeed = None,
+    min_duration: recordings.MinDuration = None,
     checkpoint: streams.Checkpoint = None,
     cluster: streams.Cluster = None,
 ) -> None:

@@ -8,6 +8,7 @@ are one matrix product as well. Any other features are summed as `VᵀV`.
 Samples are taken in blocks that stay in the processor's cache; no N x P matrix is ever held.
 """
 
+import threading
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -20,19 +21,26 @@ from unconstrain.risk import Sight
 
 # Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
 # in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.
-PRODUCTS_IN_BLOCK = 2**20
+PRODUCTS_IN_BLOCK = 2**18
 LOCAL_PRODUCTS_IN_BLOCK = 2**19
 ROWS_IN_BLOCK = 2**21
 
+NARROW = 2**12  # entries of a product that is too small to be worth its packing
+PIECE = 384
+
 Totals = list[np.ndarray]
 
+_spaces = threading.local()
 
-def parametric_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+
+def parametric_moments(
+    features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None
+) -> Moments:
     """Moments of a policy with fitted `features`: states X (N, n), what a risk sees of the actions, weights (N,)."""
     if isinstance(features, FullFeatures):
         if seen.whole:
             return _whole_moments(features, X, seen, weights)
-        M, d, k = features.n_basis_, seen.n_actions, seen.targets.shape[1]
+        M, d, k = features.n_basis_, seen.n_actions, seen.n_rows
         # Products halve the arithmetic; they pay as long as making them is no more work than making V.
         if k > 1 or _pairs(M) + _pairs(d) <= 2 * features.n_parameters_:
             return _product_moments(features, X, seen, weights)
@@ -40,7 +48,7 @@ def parametric_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, wei
 
 
 def local_moments(
-    centers: np.ndarray, width: float, X: np.ndarray, seen: Sight, weights: np.ndarray
+    centers: np.ndarray, width: float, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None
 ) -> Moments:
     """Moments of M local linear models `p_m(x) = B_m (x, 1)`, stacked, weighted by `exp(-‖x - c_m‖² / 2σ²)`.
 
@@ -52,26 +60,27 @@ def local_moments(
 
     def add(block: slice, totals: Totals) -> None:
         B, part = _with_one(X[block]), seen[block]
+        rows = part.rows
         receptive = activations(X[block], centers, width)
-        receptive *= weights[block, None]
+        if weights is not None:
+            receptive *= weights[block, None]
         # All that is summed, a row each: the distinct entries of H, then g, s and the weight itself.
-        total, space = totals
-        summed = space[:, : len(B)]
+        (total,) = totals
+        summed = _space("summed", n_summed, size)[:, : len(B)]
         products = summed[:n_products].reshape(pairs_b, pairs_q, -1)
         if seen.whole:
             products[:, 0] = distinct_products(B)
         else:
-            np.multiply(distinct_products(B)[:, None], _seen_products(part), out=products)
+            np.multiply(distinct_products(B)[:, None], _seen_products(rows), out=products)
         pulls = summed[n_products:-2].reshape(d, n + 1, -1)
-        np.multiply(_pull(part).T[:, None], B.T, out=pulls)
+        np.multiply(_pull(rows, part.targets).T[:, None], B.T, out=pulls)
         summed[-2] = part.squares
         summed[-1] = 1.0
         total += receptive.T @ summed.T
 
     n_summed = n_products + n_pulls + 2
-    rows = _rows(LOCAL_PRODUCTS_IN_BLOCK, n_summed)
-    # The second is no total but each thread's working space: memory new for every block would cost a fifth more.
-    total, _ = _sum_over_blocks(len(X), rows, [(M, n_summed), (n_summed, rows)], add)
+    size = _rows(LOCAL_PRODUCTS_IN_BLOCK, n_summed)
+    (total,) = _sum_over_blocks(len(X), size, [(M, n_summed)], add)
     H, g = total[:, :n_products], total[:, n_products:-2]
     squares, weight = total[:, -2].copy(), total[:, -1].copy()
     if seen.whole:
@@ -101,51 +110,82 @@ def distinct_products(
     return products
 
 
-def _product_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+def _product_moments(
+    features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None
+) -> Moments:
     M, d = features.n_basis_, seen.n_actions
 
     def add(block: slice, totals: Totals) -> None:
-        B, part, omega = features.basis(X[block]), seen[block], weights[block]
-        space_b, space_q = (space[:, : len(B)] for space in totals[3:])
-        totals[0] += distinct_products(B, out=space_b) @ _seen_products(part, omega, space_q).T
-        totals[1] += (_pull(part).T * omega) @ B
-        totals[2] += part.squares @ omega
+        B, part, omega = features.basis(X[block]), seen[block], None if weights is None else weights[block]
+        rows, targets = part.rows, part.targets
+        space = _space("products", _pairs(M) + _pairs(d), size)[:, : len(B)]
+        of_basis = distinct_products(B, out=space[: _pairs(M)])
+        totals[0] += _narrow(of_basis, _seen_products(rows, omega, space[_pairs(M) :]))
+        pull, squares = _pull(rows, targets).T, part.squares
+        totals[1] += (pull if omega is None else pull * omega) @ B
+        totals[2] += squares.sum() if omega is None else squares @ omega
 
-    rows = _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d))
-    # The last two are no totals but each thread's working space, as for local models.
-    shapes = [(_pairs(M), _pairs(d)), (d, M), (), (_pairs(M), rows), (_pairs(d), rows)]
-    products, g, squares, *_ = _sum_over_blocks(len(X), rows, shapes, add)
-    return Moments(_unfold(products, M, d), g.reshape(-1, 1), squares, np.sum(weights), len(X))
+    size = _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d))
+    shapes = [(_pairs(M), _pairs(d)), (d, M), ()]
+    products, g, squares = _sum_over_blocks(len(X), size, shapes, add)
+    return Moments(_unfold(products, M, d), g.reshape(-1, 1), squares, _weight(weights, X), len(X))
 
 
-def _whole_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """`A Bᵀ` of long rows, A (a, N) and B (b, N), a piece of their length at a time.
+
+    BLAS copies both into the order in which it multiplies; where there are few rows that is half the work, and
+    goes twice as fast while a piece fits the innermost cache.
+    """
+    (a, N), b = A.shape, len(B)
+    pieces = N // PIECE if a * b <= NARROW else 0
+    if pieces < 2:
+        return A @ B.T
+    cut = pieces * PIECE
+    parts = (rows[:, :cut].reshape(len(rows), pieces, PIECE).swapaxes(0, 1) for rows in (A, B))
+    left, right = parts
+    return np.matmul(left, right.swapaxes(1, 2)).sum(axis=0) + A[:, cut:] @ B[:, cut:].T
+
+
+def _whole_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None) -> Moments:
     """Nothing is projected: `H = (Σ ω b bᵀ) ⊗ I`, so the d dimensions of the action share the M x M block."""
     M, d = features.n_basis_, seen.n_actions
 
     def add(block: slice, totals: Totals) -> None:
-        root = np.sqrt(weights[block, None])
-        B, targets = features.basis(X[block]) * root, seen.targets[block] * root
+        B, targets = features.basis(X[block]), seen.targets[block].astype(np.float64, copy=False)
+        if weights is not None:
+            root = np.sqrt(weights[block, None])
+            B, targets = B * root, targets * root
         totals[0] += B.T @ B
         totals[1] += B.T @ targets
         totals[2] += np.einsum("nd,nd->", targets, targets)
 
     H, g, squares = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, M), [(M, M), (M, d), ()], add)
-    return Moments(H, g, squares, np.sum(weights), len(X))
+    return Moments(H, g, squares, _weight(weights, X), len(X))
 
 
-def _row_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+def _row_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None) -> Moments:
     P = features.n_parameters_
 
     def add(block: slice, totals: Totals) -> None:
-        part, root = seen[block], np.sqrt(weights[block, None])
-        for k in range(part.targets.shape[1]):
-            V = features.along(X[block], part.rows[:, k] * root)
+        part = seen[block]
+        rows, targets, squares = part.rows, part.targets, part.squares
+        if weights is not None:
+            root = np.sqrt(weights[block, None])
+            rows, targets, squares = rows * root[:, None], targets * root, squares * weights[block]
+        states = X[block].astype(np.float64, copy=False)
+        for k in range(part.n_rows):
+            V = features.along(states, rows[:, k])
             totals[0] += V.T @ V
-            totals[1] += V.T @ (part.targets[:, k, None] * root)
-        totals[2] += part.squares @ weights[block]
+            totals[1] += V.T @ targets[:, k, None]
+        totals[2] += squares.sum()
 
     H, g, squares = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, P), [(P, P), (P, 1), ()], add)
-    return Moments(H, g, squares, np.sum(weights), len(X))
+    return Moments(H, g, squares, _weight(weights, X), len(X))
+
+
+def _weight(weights: np.ndarray | None, X: np.ndarray) -> np.ndarray:
+    return np.asarray(float(len(X)) if weights is None else np.sum(weights))
 
 
 def _sum_over_blocks(
@@ -163,27 +203,39 @@ def _sum_over_blocks(
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in zip(first, *others, strict=True)]
 
 
+def _space(name: str, *shape: int) -> np.ndarray:
+    """This thread's own working space, its contents those of the block before.
+
+    Memory new for every block would have to be mapped and cleared each time, which costs a fifth of the whole.
+    """
+    held = getattr(_spaces, name, None)
+    if held is None or held.shape != shape:
+        held = np.empty(shape)
+        setattr(_spaces, name, held)
+    return held
+
+
 def _rows(numbers: int, width: int) -> int:
     """How many samples a block of so many numbers holds: few enough for the cache, enough to be worth a call."""
     return max(256, min(numbers // width, 8192))
 
 
 def _seen_products(
-    seen: Sight, weights: np.ndarray | None = None, out: np.ndarray | None = None
+    rows: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """The distinct entries of `ω QᵀQ`, (d(d+1)/2, N), for weights (N,); `out` may hold them."""
-    if seen.rows.shape[1] == 1:
-        return distinct_products(seen.rows[:, 0], weights, out)
-    i, j = np.triu_indices(seen.n_actions)
-    products = np.einsum("nki,nkj->nij", seen.rows, seen.rows)[:, i, j].T
+    """The distinct entries of `ω QᵀQ`, (d(d+1)/2, N), for rows Q (N, k, d), weights (N,); `out` may hold them."""
+    if rows.shape[1] == 1:
+        return distinct_products(rows[:, 0], weights, out)
+    i, j = np.triu_indices(rows.shape[2])
+    products = np.einsum("nki,nkj->nij", rows, rows)[:, i, j].T
     return products if weights is None else products * weights
 
 
-def _pull(seen: Sight) -> np.ndarray:
-    """`QᵀQ u`, (N, d)."""
-    if seen.rows.shape[1] == 1:
-        return seen.rows[:, 0] * seen.targets
-    return np.einsum("nki,nk->ni", seen.rows, seen.targets)
+def _pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """`QᵀQ u`, (N, d), for rows Q (N, k, d) and targets `Q u` (N, k)."""
+    if rows.shape[1] == 1:
+        return rows[:, 0] * targets
+    return np.einsum("nki,nk->ni", rows, targets)
 
 
 def _unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:

@@ -25,6 +25,7 @@ Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) 
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -37,36 +38,75 @@ RISKS = ("auto", "inconsistency", "direct", "constrained")
 # its direction is noise, and would be taught as truth.
 NO_MOTION = 1e-12
 
+ROWS_IN_BLOCK = 4096  # what a processor's cache holds of a few columns
+
 
 def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
     """Which actions (N, d) have a direction, as a mask (N,): those longer than `NO_MOTION` times `scale`.
 
     `scale` is the longest action's length, in the action's unit, where it is known from elsewhere.
     """
-    lengths = _lengths(U)
-    return lengths > NO_MOTION * (lengths.max(initial=0.0) if scale is None else scale)
+    r = lengths(U)
+    return r > NO_MOTION * (r.max(initial=0.0) if scale is None else scale)
 
 
 def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Directions `û` (N, d) and lengths `r` (N,) of actions U (N, d); both zero where an action is zero."""
-    lengths = _lengths(U)
-    lengths[lengths <= NO_MOTION * lengths.max(initial=0.0)] = 0.0
-    inverse = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0)
-    return U * inverse[:, None], lengths
+    seen = _along_motion(U)
+    return seen.rows[:, 0], seen.lengths
 
 
-def _lengths(U: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.einsum("nd,nd->n", U, U))
+def lengths(U: np.ndarray) -> np.ndarray:
+    """`‖u‖`, (N,), of actions U (N, d), in double precision whatever theirs is."""
+    squares = np.empty(len(U))
+    for start in range(0, len(U), ROWS_IN_BLOCK):
+        block = slice(start, start + ROWS_IN_BLOCK)
+        part = U[block].astype(np.float64, copy=False)
+        np.einsum("nd,nd->n", part, part, out=squares[block])
+    return np.sqrt(squares, out=squares)
+
+
+class Sight(Protocol):
+    """What a risk sees of N samples: `Q_n` and `Q_n u_n` of `Σ_n ‖Q_n (u_n - p_n)‖²`. A part of it is a sight too."""
+
+    @property
+    def rows(self) -> np.ndarray:
+        """`Q`, (N, k, d)."""
+        ...
+
+    @property
+    def targets(self) -> np.ndarray:
+        """`Q u`, (N, k)."""
+        ...
+
+    @property
+    def squares(self) -> np.ndarray:
+        """`‖Q u‖²` of each sample, (N,)."""
+        ...
+
+    @property
+    def whole(self) -> bool:
+        """Whether every `Q_n` is the identity, so that the action's dimensions part company."""
+        ...
+
+    @property
+    def n_actions(self) -> int:
+        """d."""
+        ...
+
+    @property
+    def n_rows(self) -> int:
+        """k."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index) -> "Sight": ...
 
 
 @dataclass(frozen=True)
-class Sight:
-    """What a risk sees of N samples: `Q_n` and `Q_n u_n` of `Σ_n ‖Q_n (u_n - p_n)‖²`.
-
-    rows: `Q`, (N, k, d).
-    targets: `Q u`, (N, k).
-    whole: true where every `Q_n` is the identity, so that the action's dimensions part company.
-    """
+class Projected:
+    """The sight through projections that are there as arrays."""
 
     rows: np.ndarray
     targets: np.ndarray
@@ -75,17 +115,67 @@ class Sight:
     def __len__(self) -> int:
         return len(self.targets)
 
-    def __getitem__(self, index) -> "Sight":
-        return Sight(self.rows[index], self.targets[index], self.whole)
+    def __getitem__(self, index) -> "Projected":
+        return Projected(self.rows[index], self.targets[index], self.whole)
 
     @property
     def n_actions(self) -> int:
         return self.rows.shape[2]
 
     @property
+    def n_rows(self) -> int:
+        return self.rows.shape[1]
+
+    @property
     def squares(self) -> np.ndarray:
-        """`‖Q u‖²` of each sample, (N,)."""
         return np.einsum("nk,nk->n", self.targets, self.targets)
+
+
+@dataclass(frozen=True)
+class AlongMotion:
+    """The sight of the inconsistency, `Q = ûᵀ` and `Q u = r`, made where it is looked at.
+
+    Directions are worked out a block at a time, in the processor's cache: looking at them is then cheaper than
+    fetching them from memory would be.
+
+    actions: (N, d), of any precision. lengths: `r`, (N,), zero where nothing moves.
+    """
+
+    actions: np.ndarray
+    lengths: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    def __getitem__(self, index) -> "AlongMotion":
+        return AlongMotion(self.actions[index], self.lengths[index])
+
+    @property
+    def whole(self) -> bool:
+        return False
+
+    @property
+    def n_actions(self) -> int:
+        return self.actions.shape[1]
+
+    @property
+    def n_rows(self) -> int:
+        return 1
+
+    @property
+    def rows(self) -> np.ndarray:
+        r = self.lengths
+        inverse = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0)
+        # Stored a row a dimension, which is how products of directions are formed.
+        return np.multiply(self.actions.T, inverse, order="C").T[:, None, :]
+
+    @property
+    def targets(self) -> np.ndarray:
+        return self.lengths[:, None]
+
+    @property
+    def squares(self) -> np.ndarray:
+        return self.lengths**2
 
 
 def unknown(projections: np.ndarray) -> np.ndarray:
@@ -103,24 +193,29 @@ def sight(risk: str, U: np.ndarray, projections: np.ndarray | None = None) -> Si
 
     projections: (N, d, d), for "constrained" and "auto"; for "auto" NaN where they are not known, or None.
     """
-    hidden = unknown(projections) if risk == "auto" and projections is not None else None
-    if risk == "inconsistency" or (risk == "auto" and (hidden is None or hidden.all())):
-        unit, lengths = directions(U)
-        return Sight(unit[:, None, :], lengths[:, None])
-    if risk == "auto":
-        assert projections is not None
-        assert hidden is not None
-        unit, lengths = directions(U)
-        rows = np.where(hidden[:, None, None], 0.0, projections)
-        targets = np.einsum("nij,nj->ni", rows, U)
-        rows[hidden, 0], targets[hidden, 0] = unit[hidden], lengths[hidden]
-        return Sight(rows, targets)
+    if risk == "inconsistency" or (risk == "auto" and projections is None):
+        return _along_motion(U)
+    d = U.shape[1]
+    if risk == "direct":
+        return Projected(np.broadcast_to(np.eye(d), (len(U), d, d)), U, whole=True)
+    assert projections is not None
     if risk == "constrained":
         # An orthogonal projection is its own Q: NᵀN = N.
-        assert projections is not None
-        return Sight(projections, np.einsum("nij,nj->ni", projections, U))
-    d = U.shape[1]
-    return Sight(np.broadcast_to(np.eye(d), (len(U), d, d)), U, whole=True)
+        return Projected(projections, np.einsum("nij,nj->ni", projections, U))
+    hidden = unknown(projections)
+    along = _along_motion(U)
+    if hidden.all():
+        return along
+    rows = np.where(hidden[:, None, None], 0.0, projections)
+    targets = np.einsum("nij,nj->ni", rows, U)
+    rows[hidden, 0], targets[hidden, 0] = along[hidden].rows[:, 0], along.lengths[hidden]
+    return Projected(rows, targets)
+
+
+def _along_motion(U: np.ndarray) -> AlongMotion:
+    r = lengths(U)
+    r[r <= NO_MOTION * r.max(initial=0.0)] = 0.0
+    return AlongMotion(U, r)
 
 
 def inconsistency(U, P) -> float:
@@ -130,8 +225,8 @@ def inconsistency(U, P) -> float:
     counted in N, so that `inconsistency <= constrained_policy_error` holds for every model and data.
     """
     U, P = _pair(U, P, "actions", "predictions")
-    unit, lengths = directions(U)
-    return float(np.mean((lengths - np.einsum("nd,nd->n", unit, P)) ** 2))
+    unit, r = directions(U)
+    return float(np.mean((r - np.einsum("nd,nd->n", unit, P)) ** 2))
 
 
 def direct(U, P) -> float:

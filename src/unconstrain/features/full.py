@@ -46,7 +46,7 @@ class FullFeatures(BaseEstimator):
         if self.transformer_ is None:
             # Stored a row a feature, which is how their products are formed.
             return np.vstack([X.T, np.ones(len(X))]).T
-        B = self.transformer_.transform(X)
+        B = self.transformer_.transform(X.astype(np.float64, copy=False))
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class Planner:
         self.posterior = posterior
         self.local = isinstance(policy, LocallyLinearPolicy)
         everything = sight("direct", np.zeros((len(candidates), policy.n_actions_)))
-        self.G = self._stack(policy._moments(candidates, everything, np.ones(len(candidates))).H)
+        self.G = self._stack(policy._moments(candidates, everything).H)
         self.P = policy._evaluate(candidates)
 
     def next(self, k: int, criterion: str) -> list[Recording]:

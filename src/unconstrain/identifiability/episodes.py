@@ -88,8 +88,9 @@ def leverages(
         local = isinstance(policy, LocallyLinearPolicy)
         one = np.column_stack([block, np.ones(len(block))])
         reach = activations(block, policy.centers_, policy.width_) if local else np.ones((len(block), 1))
-        for k in range(seen.rows.shape[1]):
-            q = seen.rows[rows, k]
+        looked = seen[rows].rows
+        for k in range(seen.n_rows):
+            q = looked[:, k]
             full = (q[:, :, None] * one[:, None, :]).reshape(len(block), -1) if local else None
             V = policy.features_.along(block, q) if full is None else full
             for root, weight in zip(roots, reach.T, strict=True):

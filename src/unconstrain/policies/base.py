@@ -164,8 +164,8 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return True
 
     @abstractmethod
-    def _moments(self, X: np.ndarray, seen: risks.Sight, weights: np.ndarray) -> Moments:
-        """The samples, added up."""
+    def _moments(self, X: np.ndarray, seen: risks.Sight, weights: np.ndarray | None = None) -> Moments:
+        """The samples, added up, whatever precision they come in."""
 
     @abstractmethod
     def _take_up(self, w: np.ndarray) -> None:
@@ -235,10 +235,9 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
 
         `longest`: the longest action known so far, if that is not among these.
         """
-        lengths = np.sqrt(np.einsum("nd,nd->n", U, U))
+        lengths = risks.lengths(U)
         longest = max(float(lengths.max(initial=0.0)), longest)
         moves = lengths > risks.NO_MOTION * longest
-        weights = np.ones(len(U)) if weights is None else weights
         counted = self._counted(moves, weights, projections)
         seen = risks.sight(self.risk, U, projections)
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
@@ -250,7 +249,8 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
                 moments[k] = self._moments(X, seen, weights)
             else:
                 index = np.flatnonzero(rows)
-                moments[k] = self._moments(X[index], seen[index], weights[index])
+                taken = None if weights is None else weights[index]
+                moments[k] = self._moments(X[index], seen[index], taken)
         return Tally(
             tuple(moments),
             len(U),
@@ -260,11 +260,14 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             0 if projections is None else int(np.count_nonzero(~risks.unknown(projections))),
         )
 
-    def _counted(self, moves: np.ndarray, weights: np.ndarray, projections: np.ndarray | None) -> np.ndarray:
+    def _counted(
+        self, moves: np.ndarray, weights: np.ndarray | None, projections: np.ndarray | None
+    ) -> np.ndarray:
         """Which samples say something, (N,): without motion or a projection there is no direction to say it of."""
         if self.risk == "auto" and projections is not None:
             moves = moves | risks.informative(projections)
-        return (moves | (self.risk in ("direct", "constrained"))) & (weights > 0)
+        counted = np.ones_like(moves) if self.risk in ("direct", "constrained") else moves
+        return counted if weights is None else counted & (weights > 0)
 
     def _include(self, tally: Tally) -> None:
         total = Tally(

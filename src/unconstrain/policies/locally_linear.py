@@ -62,7 +62,7 @@ class LocallyLinearPolicy(Policy):
     def _placed_by_data(self) -> bool:
         return isinstance(self.centers, str) or self.width is None
 
-    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None) -> Moments:
         return local_moments(self.centers_, self.width_, X, seen, weights)
 
     def _take_up(self, w: np.ndarray) -> None:

@@ -49,7 +49,7 @@ class ParametricPolicy(Policy):
     def _placed_by_data(self) -> bool:
         return self.features is not None
 
-    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray) -> Moments:
+    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None) -> Moments:
         return parametric_moments(self.features_, X, seen, weights)
 
     def _take_up(self, w: np.ndarray) -> None:

@@ -63,6 +63,20 @@ def test_local_moments_are_parametric_moments_weighted(problem, name):
         np.testing.assert_allclose(local.squares[m], alone.squares, rtol=1e-9)
 
 
+def test_models_far_from_a_block_are_left_out_of_it_and_nothing_changes():
+    rng = np.random.default_rng(0)
+    X = np.linspace(0, 200, 3000)[:, None] + rng.normal(size=(3000, 2))  # one long movement
+    U, centers = rng.normal(size=(3000, 2)), X[::100].copy()
+    seen = risk.sight("inconsistency", U)
+    local = local_moments(centers, 1.0, X, seen)
+    V = seen.rows[:, 0, :, None] * np.column_stack([X, np.ones(3000)])[:, None]
+    V = V.reshape(3000, -1)
+    for m, center in enumerate(centers):
+        receptive = np.exp(-np.sum((X - center) ** 2, axis=1) / 2)
+        H = V.T @ (V * receptive[:, None])
+        np.testing.assert_allclose(local.H[m], H, rtol=1e-12, atol=1e-14 * abs(H).max())
+
+
 @settings(deadline=None)
 @given(problems(min_samples=4), st.sampled_from(risk.RISKS), st.floats(0.1, 0.9))
 def test_moments_of_two_parts_add_to_those_of_the_whole(problem, name, share):

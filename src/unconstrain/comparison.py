@@ -34,6 +34,9 @@ MOST_PARAMETERS = 1000
 MOST_CENTERS = 50
 FINE_KNOTS = 31
 
+INCONSISTENCY = "held-out inconsistency"
+OF_WHAT_IS_KNOWN = "held-out error of what is known"
+
 
 @dataclass(frozen=True)
 class Row:
@@ -59,9 +62,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """The comparison: rows with the least inconsistent candidate first, and the failed ones last."""
+    """The comparison: rows with the least inconsistent candidate first, and the failed ones last.
+
+    measure: what the candidates are judged by, in words.
+    """
 
     rows: tuple[Row, ...]
+    measure: str = INCONSISTENCY
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -78,7 +85,7 @@ class Table:
 
     def __str__(self) -> str:
         """A Markdown table, its columns aligned."""
-        head = ("candidate", "held-out inconsistency", "explained", "λ", "parameters", "seconds")
+        head = ("candidate", self.measure, "explained", "λ", "parameters", "seconds")
         lines = [head, *(_cells(row) for row in self.rows if row.problem is None)]
         widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
         text = [_line([c.ljust(w) for c, w in zip(line, widths, strict=True)]) for line in lines]
@@ -183,7 +190,8 @@ def select_policy(
         raise PolicyError(
             f"none of the candidates could be fitted; the first, {rows[0].name}: {rows[0].problem}"
         )
-    return Selection(policies[rows[0].name], rows[0].name, Table(tuple(rows)), policies)
+    table = Table(tuple(rows), INCONSISTENCY if projections is None else OF_WHAT_IS_KNOWN)
+    return Selection(policies[rows[0].name], rows[0].name, table, policies)
 
 
 def _named(given, n: int, d: int) -> dict[str, Policy]:

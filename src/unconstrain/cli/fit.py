@@ -245,7 +245,7 @@ def _compare(console, demos, groups, model, named, risk, known) -> tuple[str, co
 
 
 def _report(console: Console, result: comparison.Selection, kept: str) -> None:
-    table = Table("learnt by", "held-out inconsistency", "share of observed motion explained")
+    table = Table("learnt by", result.table.measure, "share of observed motion explained")
     for row in sorted(result.table, key=lambda row: row.name.endswith("direct")):
         name = row.name.split(", ")[-1] + (" (saved)" if row.name.endswith(kept) else "")
         table.add_row(name, f"{row.inconsistency:.4g}", f"{row.explained:.2%}")

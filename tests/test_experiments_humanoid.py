@@ -186,7 +186,7 @@ def test_without_opengl_a_sentence_and_the_other_figures(
     tmp_path, monkeypatch, demonstrator, recorded, policies
 ):
     def missing(*_, **__):
-        raise NoOpenGL("There is no OpenGL to draw with here.")
+        raise NoOpenGL("there is no OpenGL to draw with here")
 
     monkeypatch.setattr(grasp_figures, "Camera", missing)
     pictures = grasp_figures.write(tmp_path, demonstrator, *recorded, policies)

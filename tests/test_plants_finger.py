@@ -54,7 +54,7 @@ def test_contact_rows_are_the_gradient_of_the_clearance():
 @given(boxes)
 def test_never_inside_and_always_the_projected_policy(box):
     if FINGER.clearance(CURLED[None], box)[0] < 0:
-        with pytest.raises(DataError, match="Start 0 lies inside an obstacle"):
+        with pytest.raises(DataError, match="start 0 lies inside an obstacle"):
             FINGER.demonstrate(CURLED, box)
         return
     demos = FINGER.demonstrate(CURLED, box, length=60, rate=20)

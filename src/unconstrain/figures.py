@@ -138,7 +138,7 @@ def learned_field(
     P = _actions(policy, X)
     if P.shape != U.shape:
         raise PolicyError(
-            f"The policy has {P.shape[1]} actions and the demonstrations {U.shape[1]}: draw the ones it learnt."
+            f"the policy has {P.shape[1]} actions and the demonstrations {U.shape[1]}: draw the ones it learnt"
         )
     arrows = X.shape[1] == U.shape[1]
     pairs = list(combinations(range(min(X.shape[1], SHOWN_COORDINATES)), 2))
@@ -180,8 +180,8 @@ def check_suffix(path: str | os.PathLike[str] | None) -> None:
     """Raise `UnconstrainError` for a figure's name that does not end in one of `SUFFIXES`; None is no figure."""
     if path is not None and Path(path).suffix.lower() not in SUFFIXES:
         raise UnconstrainError(
-            f"A figure cannot be written to {Path(path).name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
-            f"{SUFFIXES[-1]}."
+            f"a figure cannot be written to {Path(path).name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
+            f"{SUFFIXES[-1]}"
         )
 
 

@@ -74,12 +74,12 @@ def rollout(
     predict = policy.predict if hasattr(policy, "predict") else policy
     if not callable(predict):
         raise PolicyError(
-            f"A rollout needs a policy with a predict method, or a function of states, not {policy!r:.60}."
+            f"a rollout needs a policy with a predict method, or a function of states, not {policy!r:.60}"
         )
     if isinstance(steps, bool) or steps != int(steps) or steps < 1:
-        raise UnconstrainError(f"A rollout needs a whole number of steps, at least 1, not {steps}.")
+        raise UnconstrainError(f"a rollout needs a whole number of steps, at least 1, not {steps}")
     if not (np.isfinite(dt) and dt > 0):
-        raise UnconstrainError(f"The time step dt must be a positive number of seconds, not {dt}.")
+        raise UnconstrainError(f"the time step dt must be a positive number of seconds, not {dt}")
     steps, single = int(steps), np.ndim(start) == 1
     x = _checked_start(start, getattr(policy, "n_features_in_", None))
 
@@ -100,8 +100,8 @@ def rollout(
             x = x + dt * u
             if not np.isfinite(x).all():
                 raise UnconstrainError(
-                    f"The rollout left all bounds at step {k + 1} of {steps} ({(k + 1) * dt:g} s): use a "
-                    "smaller time step dt, or start nearer to the data the policy was learnt from."
+                    f"the rollout left all bounds at step {k + 1} of {steps} ({(k + 1) * dt:g} s): use a "
+                    "smaller time step dt, or start nearer to the data the policy was learnt from"
                 )
             actions[:, k] = u
             states[:, k + 1] = x
@@ -113,18 +113,18 @@ def _checked_start(start: ArrayLike, expected: int | None) -> Array:
     try:
         x = np.atleast_2d(np.asarray(start, dtype=np.float64))
     except (TypeError, ValueError) as error:
-        raise DataError("The start must be numbers: an array (n,), or (S, n) for several starts.") from error
+        raise DataError("the start must be numbers: an array (n,), or (S, n) for several starts") from error
     if x.ndim != 2 or x.size == 0:
-        raise DataError(f"The start must be an array (n,), or (S, n) for several, not {np.shape(start)}.")
+        raise DataError(f"the start must be an array (n,), or (S, n) for several, not {np.shape(start)}")
     if expected is not None and x.shape[1] != expected:
         raise PolicyError(
-            f"The start has {_counted(x.shape[1], 'number')} but the policy was learnt over states of "
-            f"{_counted(expected, 'dimension')}: give {expected}."
+            f"the start has {_counted(x.shape[1], 'number')} but the policy was learnt over states of "
+            f"{_counted(expected, 'dimension')}: give {expected}"
         )
     if not np.isfinite(x).all():
         row, column = np.argwhere(~np.isfinite(x))[0]
         raise DataError(
-            f"The start has NaN or infinity in dimension {column} of start {row}; give finite numbers."
+            f"the start has NaN or infinity in dimension {column} of start {row}; give finite numbers"
         )
     return x
 
@@ -133,12 +133,12 @@ def _actions(predict: Callable[[Array], ArrayLike], x: Array) -> Array:
     u = np.asarray(predict(x), dtype=np.float64)
     if u.ndim != 2 or len(u) != len(x):
         raise PolicyError(
-            f"The policy must map states of shape {x.shape} to one row of actions each, not to {u.shape}."
+            f"the policy must map states of shape {x.shape} to one row of actions each, not to {u.shape}"
         )
     if u.shape[1] != x.shape[1]:
         raise PolicyError(
-            f"The policy maps {_counted(x.shape[1], 'state')} to {_counted(u.shape[1], 'action')}, and only "
-            "velocities of the state, one each, can be rolled out: learn it from such actions."
+            f"the policy maps {_counted(x.shape[1], 'state')} to {_counted(u.shape[1], 'action')}, and only "
+            "velocities of the state, one each, can be rolled out: learn it from such actions"
         )
     return u
 
@@ -147,13 +147,13 @@ def _projection(rows: ArrayLike, shape: tuple[int, ...]) -> Array:
     N = projection(rows)
     if N.shape[-1] != shape[1]:
         raise DataError(
-            f"The constraint's rows have {_counted(N.shape[-1], 'number')} but the policy has "
-            f"{_counted(shape[1], 'action')}: give one column per action."
+            f"the constraint's rows have {_counted(N.shape[-1], 'number')} but the policy has "
+            f"{_counted(shape[1], 'action')}: give one column per action"
         )
     if N.ndim == 3 and len(N) != shape[0]:
         raise DataError(
-            f"The constraint gives rows for {_counted(len(N), 'state')} where there "
-            f"{'is' if shape[0] == 1 else 'are'} {shape[0]}: return shape (S, k, n), or (k, n) for all alike."
+            f"the constraint gives rows for {_counted(len(N), 'state')} where there "
+            f"{'is' if shape[0] == 1 else 'are'} {shape[0]}: return shape (S, k, n), or (k, n) for all alike"
         )
     return N
 

@@ -78,19 +78,19 @@ def combine(*A: ArrayLike) -> NDArray[np.float64]:
         If none is given, the numbers of actions d or of samples N differ, or an entry is not finite.
     """
     if not A:
-        raise DataError("There is nothing to combine: give at least one constraint matrix.")
+        raise DataError("there is nothing to combine: give at least one constraint matrix")
     parts = [_checked(part) for part in A]
     widths = sorted({part.shape[-1] for part in parts})
     if len(widths) > 1:
         raise DataError(
-            f"Constraint matrices over {_listed(widths)} actions cannot be combined: "
-            "give all of them one column per action dimension."
+            f"constraint matrices over {_listed(widths)} actions cannot be combined: "
+            "give all of them one column per action dimension"
         )
     samples = sorted({len(part) for part in parts if part.ndim == 3})
     if len(samples) > 1:
         raise DataError(
-            f"Constraint matrices of {_listed(samples)} samples cannot be combined: give one matrix per "
-            "sample of the same recording, or a single one for all."
+            f"constraint matrices of {_listed(samples)} samples cannot be combined: give one matrix per "
+            "sample of the same recording, or a single one for all"
         )
     if samples:
         parts = [np.broadcast_to(part, (samples[0], *part.shape[-2:])) for part in parts]
@@ -108,17 +108,17 @@ def _checked(A: ArrayLike) -> NDArray[np.float64]:
         rows = np.asarray(A, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(
-            "A constraint matrix must be an array of numbers of shape (k, d) or (N, k, d); "
-            "pad samples that have fewer constraints with rows of zeros."
+            "a constraint matrix must be an array of numbers of shape (k, d) or (N, k, d); "
+            "pad samples that have fewer constraints with rows of zeros"
         ) from error
     if rows.ndim not in (2, 3):
         raise DataError(
-            f"A constraint matrix must have shape (k, d), or (N, k, d) for one per sample, not {rows.shape}; "
-            "write a single row as [[a1, a2, ...]]."
+            f"a constraint matrix must have shape (k, d), or (N, k, d) for one per sample, not {rows.shape}; "
+            "write a single row as [[a1, a2, ...]]"
         )
     if not np.isfinite(rows).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(rows))[0])
-        raise DataError(f"The constraint matrix has NaN or infinity at index {where}; remove or repair it.")
+        raise DataError(f"the constraint matrix has NaN or infinity at index {where}; remove or repair it")
     return rows
 
 

@@ -121,7 +121,7 @@ def reproduce(out: Path, *, trials: int | None, jobs: int, console: Console) -> 
             "Frames of the first movement: the hand gripped, and sliding on a table."
         )
     except NoOpenGL as error:
-        findings = (*findings, f"No frames: {error}")
+        findings = (*findings, f"No frames: {error}.")
     return Outcome(
         title="The arm in physics",
         table=table(results),

@@ -84,7 +84,7 @@ def reproduce(
     try:
         simulator()
     except RobotError as error:
-        findings.append(f"Measured constraints are left out: {error}")
+        findings.append(f"Measured constraints are left out: {error}.")
     else:
         measured = run_trials(
             measured_trial, trials, out / "measured.jsonl",

@@ -207,5 +207,5 @@ def write(
         figures.save(through_unseen_gap(demonstrator, policies), out / "unseen.png")
         drawn = list(captions)
     except NoOpenGL as error:
-        left_out = (f"Pictures of the robot are left out: {error}",)
+        left_out = (f"Pictures of the robot are left out: {error}.",)
     return Pictures({out / f"{name}.png": captions[name] for name in drawn}, (out / "fig6.svg",), left_out)

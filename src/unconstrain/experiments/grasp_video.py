@@ -63,7 +63,7 @@ def write(path: str | os.PathLike[str], demonstrator: Demonstrator, policies: di
     """
     path = Path(path)
     if path.suffix.lower() != ".mp4":
-        raise UnconstrainError(f"A video cannot be written to {path.name!r}: end the name in .mp4.")
+        raise UnconstrainError(f"a video cannot be written to {path.name!r}: end the name in .mp4")
     try:
         import imageio.v2
         from imageio_ffmpeg import get_ffmpeg_exe
@@ -71,7 +71,7 @@ def write(path: str | os.PathLike[str], demonstrator: Demonstrator, policies: di
         get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:
         raise UnconstrainError(
-            f"Videos are written by imageio and its ffmpeg, which cannot be imported here ({error}): "
+            f"videos are written by imageio and its ffmpeg, which cannot be imported here ({error}): "
             "pip install 'unconstrain[sim]'"
         ) from error
     get_writer: Any = imageio.v2.get_writer  # what it returns depends on the format

@@ -82,8 +82,8 @@ def check_display() -> None:
     """Raise `UnconstrainError` where there is no display, before anything long is begun."""
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise UnconstrainError(
-            "There is no display to open a window on: run this at a desktop, or make a video instead, "
-            "unconstrain reproduce grasp --video grasp.mp4."
+            "there is no display to open a window on: run this at a desktop, or make a video instead, "
+            "unconstrain reproduce grasp --video grasp.mp4"
         )
 
 
@@ -102,7 +102,7 @@ def view(demonstrator: Demonstrator, policy: Any) -> None:
     except (ImportError, RuntimeError) as error:
         raise UnconstrainError(
             f"MuJoCo's viewer cannot be opened here ({' '.join(str(error).split())}): on macOS start with "
-            "mjpython, elsewhere check that OpenGL works."
+            "mjpython, elsewhere check that OpenGL works"
         ) from error
     with window:
         window.cam.lookat, window.cam.distance = demonstrator.scene.origin, 1.8

@@ -95,7 +95,7 @@ def with_gap(
     """
     half = np.clip(np.atleast_1d(np.asarray(widths, dtype=np.float64)), 0.0, span) / 2
     if half.ndim != 1:
-        raise UnconstrainError(f"A barrier needs one gap width per movement, not an array {half.shape}.")
+        raise UnconstrainError(f"a barrier needs one gap width per movement, not an array {half.shape}")
     low, high = np.empty((len(half), 2, 3)), np.empty((len(half), 2, 3))
     low[..., 0], high[..., 0] = x - thickness / 2, x + thickness / 2
     low[..., 2], high[..., 2] = bottom, bottom + height

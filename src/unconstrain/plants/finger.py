@@ -46,11 +46,11 @@ class Box:
 
     def __post_init__(self) -> None:
         if not np.isfinite([*self.center, *self.size, self.angle, self.rounding]).all():
-            raise UnconstrainError("An obstacle's center, size, angle and rounding must be finite numbers.")
+            raise UnconstrainError("an obstacle's center, size, angle and rounding must be finite numbers")
         if not 0 <= 2 * self.rounding < min(self.size):
             raise UnconstrainError(
-                f"An obstacle of size {self.size} cannot have corners of radius {self.rounding}: "
-                "keep the radius under half of the shorter side."
+                f"an obstacle of size {self.size} cannot have corners of radius {self.rounding}: "
+                "keep the radius under half of the shorter side"
             )
 
     @cached_property
@@ -165,11 +165,11 @@ class Finger:
         """
         starts = self._postures(np.atleast_2d(starts))
         if length < 1 or not (np.isfinite(rate) and rate > 0):
-            raise UnconstrainError(f"Give at least one sample and a positive rate, not {length} and {rate}.")
+            raise UnconstrainError(f"give at least one sample and a positive rate, not {length} and {rate}")
         scenes = _scenes(obstacles, len(starts))
         for index, (q, boxes) in enumerate(zip(starts, scenes, strict=True)):
             if self.clearance(q[None], boxes)[0] < 0:
-                raise DataError(f"Start {index} lies inside an obstacle: move one of the two away.")
+                raise DataError(f"start {index} lies inside an obstacle: move one of the two away")
         d = len(self.lengths)
         states, projections = np.empty((len(starts), length, d)), np.empty((len(starts), length, d, d))
         for episode, (q, boxes) in enumerate(zip(starts, scenes, strict=True)):
@@ -277,11 +277,11 @@ class Finger:
         Q = np.asarray(Q, dtype=np.float64)
         if Q.ndim != 2 or Q.shape[1] != len(self.lengths):
             raise DataError(
-                f"The finger has {len(self.lengths)} joints: give postures of shape "
-                f"(N, {len(self.lengths)}), not {Q.shape}."
+                f"the finger has {len(self.lengths)} joints: give postures of shape "
+                f"(N, {len(self.lengths)}), not {Q.shape}"
             )
         if not np.isfinite(Q).all():
-            raise DataError("A posture of the finger has NaN or infinity: give joint angles in radians.")
+            raise DataError("a posture of the finger has NaN or infinity: give joint angles in radians")
         return Q
 
 
@@ -298,6 +298,6 @@ def _scenes(obstacles: Box | Sequence[Box] | Sequence[Sequence[Box]], starts: in
     per_start = [one for one in obstacles if not isinstance(one, Box)]
     if len(per_start) != len(obstacles) or len(per_start) != starts:
         raise UnconstrainError(
-            f"Give obstacles shared by all, or one list of obstacles for each of the {starts} starts."
+            f"give obstacles shared by all, or one list of obstacles for each of the {starts} starts"
         )
     return per_start

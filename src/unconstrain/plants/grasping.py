@@ -116,8 +116,8 @@ class Demonstrator:
                     return bodies
                 body = WholeBody(self.humanoid, model)
         raise UnconstrainError(
-            f"Only {len(bodies)} of {tries} random postures hold both hands in front of the barrier and above "
-            "the table: give another home posture or other hands."
+            f"only {len(bodies)} of {tries} random postures hold both hands in front of the barrier and above "
+            "the table: give another home posture or other hands"
         )
 
     def record(

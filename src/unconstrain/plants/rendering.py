@@ -57,8 +57,8 @@ class Camera:
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:  # what fails, and how, differs between OpenGL's many ways to be absent
             raise NoOpenGL(
-                f"There is no OpenGL to draw with here ({' '.join(str(error).split()) or type(error).__name__}): "
-                "install EGL or OSMesa and set MUJOCO_GL to egl or osmesa, or leave the pictures out."
+                f"there is no OpenGL to draw with here ({' '.join(str(error).split()) or type(error).__name__}): "
+                "install EGL or OSMesa and set MUJOCO_GL to egl or osmesa, or leave the pictures out"
             ) from error
         self._camera = mujoco.MjvCamera()
         self._camera.lookat, self._camera.distance = np.asarray(at, dtype=np.float64), distance

@@ -34,7 +34,7 @@ def simulator() -> ModuleType:
         import mujoco.batch
     except ImportError as error:
         raise UnconstrainError(
-            f"Robots are simulated by MuJoCo, which cannot be imported here ({error}): "
+            f"robots are simulated by MuJoCo, which cannot be imported here ({error}): "
             "pip install 'unconstrain[sim]'"
         ) from error
     except Exception as error:  # MuJoCo looks for OpenGL while it is imported, and how that fails differs

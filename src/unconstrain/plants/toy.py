@@ -38,9 +38,7 @@ class LimitCycle:
         """Actions (N, 2) at states (N, 2)."""
         X = np.asarray(X, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != 2:
-            raise DataError(
-                f"The limit cycle moves in the plane: give states of shape (N, 2), not {X.shape}."
-            )
+            raise DataError(f"the limit cycle moves in the plane: give states of shape (N, 2), not {X.shape}")
         turn = np.stack([X[:, 1], -X[:, 0]], axis=1)
         return (self.rho - np.sum(X**2, axis=1, keepdims=True)) * X + self.omega * turn
 
@@ -89,11 +87,11 @@ def demonstrate(
     """
     if n_episodes < 1 or length < 1 or not (np.isfinite(rate) and rate > 0):
         raise UnconstrainError(
-            f"Demonstrations need at least one episode and sample and a positive rate, not {n_episodes}, "
-            f"{length} and {rate}."
+            f"demonstrations need at least one episode and sample and a positive rate, not {n_episodes}, "
+            f"{length} and {rate}"
         )
     if not (np.isfinite(noise) and noise >= 0):
-        raise UnconstrainError(f"The noise is a share of the actions' scale, 0 or more, not {noise}.")
+        raise UnconstrainError(f"the noise is a share of the actions' scale, 0 or more, not {noise}")
     rng = np.random.default_rng(random_state)
     policy = policy or LimitCycle()
 

@@ -50,7 +50,7 @@ def controller() -> Any:
             raise ImportError("qpsolvers finds no daqp")
     except ImportError as error:
         raise UnconstrainError(
-            f"Whole-body motion is controlled by mink and DAQP, which cannot be imported here ({error}): "
+            f"whole-body motion is controlled by mink and DAQP, which cannot be imported here ({error}): "
             "pip install 'unconstrain[sim]'"
         ) from error
     return mink

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rich.console import Console
 from sklearn.base import clone
 
 import unconstrain as uc
-from unconstrain.experiments import constraints_surfaces, constraints_trials
+from unconstrain.experiments import constraints, constraints_surfaces, constraints_trials
 from unconstrain.learnt_constraints.base import held_out_projections
 from unconstrain.plants import arm
 from unconstrain.plants.planar import PlanarArm
@@ -278,6 +279,19 @@ def test_the_experiment_finds_every_constraint_it_can_hold_without_noise():
         D = setting.record()
         found = setting.estimator.fit(D.states, D.actions, groups=D.episodes)
         assert nppe(D.policy, D.projections, found.predict(D.states)) < 1e-20, name
+
+
+def test_without_the_extra_the_experiment_says_what_it_left_out(tmp_path, monkeypatch):
+    def missing():
+        raise uc.errors.UnconstrainError("robots are simulated by MuJoCo, which is not here")
+
+    monkeypatch.setattr(constraints, "simulator", missing)
+    outcome = constraints.reproduce(tmp_path, trials=1, console=Console(quiet=True), data=tmp_path)
+    assert (
+        "Measured constraints are left out: robots are simulated by MuJoCo, which is not here."
+        in outcome.findings
+    )
+    assert outcome.findings[-1].startswith("The recorded surfaces are left out")
 
 
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recorded surfaces are not here")

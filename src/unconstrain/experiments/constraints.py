@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from unconstrain import atomic, figures
+from unconstrain.errors import UnconstrainError
 from unconstrain.experiments import constraints_figures
 from unconstrain.experiments.constraints_surfaces import BLOCKS, Surfaces, found
 from unconstrain.experiments.constraints_trials import (
@@ -31,7 +32,7 @@ from unconstrain.experiments.constraints_trials import (
 )
 from unconstrain.experiments.outcome import Outcome
 from unconstrain.experiments.trials import run_trials
-from unconstrain.plants.robot import RobotError, simulator
+from unconstrain.plants.robot import simulator
 
 TRIALS = 50
 RECORDINGS = Path("../shared/data")
@@ -83,7 +84,7 @@ def reproduce(
     }
     try:
         simulator()
-    except RobotError as error:
+    except UnconstrainError as error:
         findings.append(f"Measured constraints are left out: {error}.")
     else:
         measured = run_trials(

@@ -34,6 +34,24 @@ def test_a_folder_is_read_as_a_stream(run, folder):  # noqa: F811
     assert "checkpoint of another policy" in err
 
 
+def test_other_folders_are_read_as_the_one_learnt_from(run, folder):  # noqa: F811
+    code, out, err = run("fit", folder, *COLUMNS, "--model", "linear")
+    assert code == 0, err
+    assert "unconstrain evaluate policy.skops" in out
+    code, out, err = run("evaluate", "policy.skops", folder)
+    assert code == 0, err
+    assert f"read: {len(X)} samples, {len(np.unique(EPISODES))} episodes" in out
+
+
+def test_what_needs_all_data_gets_a_folder_at_once(run, folder, tmp_path):  # noqa: F811
+    code, out, err = run(
+        "fit", folder, *COLUMNS, "--model", "linear", "--figure", "a.png", "--min-speed", "0.01"
+    )
+    assert code == 0, err
+    assert "learnt by" in out
+    assert (tmp_path / "a.png").exists()
+
+
 def test_a_cluster_of_this_machine(run, folder):  # noqa: F811
     pytest.importorskip("distributed")
     code, _, err = run("fit", folder, *COLUMNS, "--model", "linear", "--cluster", "local")
@@ -92,10 +110,9 @@ def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):  # noqa: F811
         (("--force", "f0,f1,f2"), "--force needs --force-threshold"),
         (("--free", "u9"), "no column 'u9' for free"),
         (("--free", "x0", "--risk", "direct"), "leave out --risk direct, or --force and --free"),
-        (("--free", "x0", "--model", "auto"), "--model auto needs all data in memory"),
-        (("--figure", "a.png"), "--figure needs all data in memory"),
-        (("--min-speed", "0.1"), "--min-speed needs all data in memory"),
-        (("--model", "auto"), "--model auto needs all data in memory"),
+        (("--figure", "a.png", "--cluster", "local"), "--figure needs all data in memory"),
+        (("--min-speed", "0.1", "--checkpoint", "a.npz"), "--min-speed needs all data in memory"),
+        (("--model", "auto", "--checkpoint", "a.npz"), "--model auto needs all data in memory"),
         (("--cluster", "local", "--checkpoint", "a.npz"), "leave out --checkpoint, or --cluster"),
         (("--cluster", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
     ],

@@ -89,7 +89,7 @@ def test_paths(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     for paths, sentence in [
         (tmp_path / "none.csv", r"there is no file .*none.csv"),
-        (tmp_path / "folder.csv", r"is a folder: give its files, or a pattern"),
+        (tmp_path / "folder.csv", r"is a folder without Parquet files: give its files, or a pattern"),
         (tmp_path / "b.xlsx", r"suffix '.xlsx'; those known are .csv, .tsv, .txt, .npz, .parquet"),
         (str(tmp_path / "*.tsv"), r"no file matches"),
         ([], r"no files were given"),

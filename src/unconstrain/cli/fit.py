@@ -105,22 +105,17 @@ def fit(
         risk = "auto"
         named = named and {name: policy.set_params(risk=risk) for name, policy in named.items()}
     console = reporting.console()
-    if streams.is_meant(files, checkpoint, cluster):
+    needs_memory = {"figure": figure, "folds": folds, "min_speed": min_speed}
+    at_once = named is None or any(value is not None for value in needs_memory.values())
+    if streams.is_meant(files, checkpoint, cluster, at_once):
         if force_threshold is not None:
             told["force_threshold"] = force_threshold
         streamed = streams.learn(
-            console,
-            named[model] if named else None,
-            files,
-            how | told,
-            checkpoint,
-            cluster,
-            figure=figure,
-            folds=folds,
-            min_speed=min_speed,
+            console, named[model] if named else None, files, how | told, checkpoint, cluster, **needs_memory
         )
+        streamed.recording_ = how
         streamed.save(out)
-        console.print(f"policy: {out}")
+        _point_on(console, out)
         return
     with console.status("reading"):
         demos = recordings.read(files, how | told)
@@ -155,14 +150,18 @@ def fit(
         figures.save(figures.learned_field(demos, policy), figure)
         console.print(f"figure: {figure}")
     policy.save(out)
-    console.print(f"policy: {out}")
+    _point_on(console, out)
     start = ",".join(f"{value:.3g}" for value in demos.states[0])
-    console.print("\nnext, on recordings the policy has not seen, or to see where it leads:")
-    console.print(f"  unconstrain evaluate {quoted(out)} OTHER_FILES...")
     if demos.states.shape[1] == demos.actions.shape[1]:
         console.print(
             f'  unconstrain rollout {quoted(out)} --start="{start}" --steps 500 --dt 0.02',
         )
+
+
+def _point_on(console: Console, out: Path) -> None:
+    console.print(f"policy: {out}")
+    console.print("\nnext, on recordings the policy has not seen, or to see where it leads:")
+    console.print(f"  unconstrain evaluate {quoted(out)} OTHER_FILES...")
 
 
 def describe(console: Console, demos: Demonstrations) -> None:

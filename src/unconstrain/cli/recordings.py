@@ -9,6 +9,7 @@ import typer
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.readers import load
+from unconstrain.readers.roles import DIFFERENTIATE
 
 Files = Annotated[
     list[str],
@@ -85,7 +86,7 @@ def asked(options: Mapping[str, Any]) -> dict[str, Any]:
     return _given(
         {
             "state": columns(options["state"]),
-            "action": columns(options["action"]),
+            "action": DIFFERENTIATE if options["action"] == DIFFERENTIATE else columns(options["action"]),
             "time": one_column(options["time"], "--time"),
             "episode": one_column(options["episode"], "--episode"),
             **{name: options[name] for name in PLAIN},

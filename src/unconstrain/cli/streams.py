@@ -31,10 +31,13 @@ Cluster = Annotated[
 ]
 
 
-def is_meant(files: list[str], checkpoint: Path | None, cluster: str | None) -> bool:
-    """Whether these are to be read as a stream: folders and URIs are, and whatever needs a stream."""
-    streams = checkpoint is not None or cluster is not None
-    return streams or any("://" in name or Path(name).expanduser().is_dir() for name in files)
+def is_meant(files: list[str], checkpoint: Path | None, cluster: str | None, at_once: bool) -> bool:
+    """Whether these are to be read as a stream: URIs are, and whatever needs a stream.
+
+    So are folders, unless something is asked `at_once` that needs all data in memory.
+    """
+    streams = checkpoint is not None or cluster is not None or any("://" in name for name in files)
+    return streams or (not at_once and any(Path(name).expanduser().is_dir() for name in files))
 
 
 def learn(

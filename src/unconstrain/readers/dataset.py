@@ -17,12 +17,12 @@ from unconstrain.readers.blocks import Array, Block, Samples
 from unconstrain.readers.known import Known
 from unconstrain.readers.loading import NothingLeft, derived
 from unconstrain.readers.reading import Reading
+from unconstrain.readers.roles import DIFFERENTIATE, Roles
 from unconstrain.readers.shards import Field, Paths, Piece, Shards
 from unconstrain.readers.stamps import seconds
 from unconstrain.readers.table import Column, Table
 from unconstrain.selection import EpisodeFolds
 
-DIFFERENTIATE = "differentiate"
 HEAD_ROWS = 2
 
 
@@ -235,14 +235,7 @@ class Dataset:
         whole = pa.chunked_array(
             [c for column in columns for c in (column.chunks if hasattr(column, "chunks") else [column])]
         )
-        bounds = np.cumsum([0, *(len(piece.rows) for piece in pieces)])
-
-        def place(index: int) -> str:
-            which = int(np.searchsorted(bounds, index, side="right")) - 1
-            piece = pieces[which]
-            return f"row {piece.first + index - bounds[which]} of {self.shards.name(piece.file)} (counted from 0)"
-
-        table = Table(self.shards.shown, [Column(how.time, whole)], place)
+        table = Table(self.shards.shown, [Column(how.time, whole)], self.shards.places(pieces))
         return seconds(table, 0, codes, how.time_unit)[0]
 
 
@@ -259,18 +252,16 @@ def opened(source: Paths, reading: Reading, batch_rows: int, *, complete: bool =
     table, schema = shards.first_rows()
     restarts = False
     if robot:
-        state = lerobot.STATE if state is None else state
-        action = lerobot.ACTION if action is None else action
-        episode = lerobot.EPISODE if episode is None else episode
-        time = lerobot.TIME if time is None else time
+        roles = robot.roles(Roles(state, action, time, episode))
+        state, action, episode, time = roles.state, roles.action, roles.episode, roles.time
     elif state is None:
-        roles = saved.roles(schema)
-        if roles is None:
+        own = saved.roles(schema)
+        if own is None:
             raise DataError(f"{shards.shown}: give state=, the columns that are states; {table.listing()}")
-        state, action = roles["states"], roles["actions"] if action is None else action
-        episode, time = roles["episodes"], roles.get("time", time)
+        state, action = own["states"], own["actions"] if action is None else action
+        episode, time = own["episodes"], own.get("time", time)
         restarts = len(shards.paths) > 1  # each file counts its episodes from 0
-    fields = partial(_fields, table, robot)
+    fields = partial(_fields, table)
     differentiated = action is None or action == DIFFERENTIATE
     if differentiated and time is None:
         raise DataError(
@@ -303,15 +294,10 @@ def opened(source: Paths, reading: Reading, batch_rows: int, *, complete: bool =
     )
 
 
-def _fields(table: Table, robot: lerobot.LeRobot | None, role: str, keys: Any) -> tuple[Field, ...]:
+def _fields(table: Table, role: str, keys: Any) -> tuple[Field, ...]:
     each = [keys] if isinstance(keys, str | int) else list(keys)
-    own = {"state": lerobot.STATE, "action": lerobot.ACTION}.get(role, role)
-    names = robot.component_names(own) if robot else []
-    known = {column.name for column in table.columns} | {column.part_of for column in table.columns}
     fields: list[Field] = []
     for key in each:
-        if isinstance(key, str) and key not in known and key in names:
-            key = f"{own}[{names.index(key)}]"
         for position in table.find(role, key):
             column = table.columns[position]
             component = int(column.name[len(column.part_of) + 1 : -1]) if column.part_of else None

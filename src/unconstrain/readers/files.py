@@ -41,7 +41,9 @@ def recordings(paths: Paths) -> list[str]:
 def existing(shown: str) -> Path:
     path = Path(shown)
     if path.is_dir():
-        raise DataError(f"{shown} is a folder: give its files, or a pattern such as {path / '*.csv'}")
+        raise DataError(
+            f"{shown} is a folder without Parquet files: give its files, or a pattern such as {path / '*.csv'}"
+        )
     if path.suffix.lower() not in SUFFIXES:
         raise DataError(
             f"{shown} cannot be read by its suffix {path.suffix!r}; those known are {', '.join(SUFFIXES)}"

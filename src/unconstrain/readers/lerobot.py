@@ -7,14 +7,16 @@ whose components may have names in `info.json`, `episode_index`, and `timestamp`
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.fs
 
 from unconstrain.errors import DataError
+from unconstrain.readers.roles import Keys, Roles
 from unconstrain.readers.shards import Shards
+from unconstrain.readers.table import Key
 
 STATE, ACTION, EPISODE, TIME = "observation.state", "action", "episode_index", "timestamp"
 VERSIONS = ("v2.0", "v2.1", "v3.0")
@@ -36,6 +38,25 @@ class LeRobot:
             names = [name for group in names.values() if isinstance(group, list) for name in group]
         fits = isinstance(names, list) and isinstance(shape, list) and shape == [len(names)]
         return [str(name) for name in names] if fits and isinstance(names, list) else []
+
+    def roles(self, given: Roles) -> Roles:
+        """The dataset's own columns in the roles that are not given; components that go by their names, by place."""
+        return replace(
+            given,
+            state=self._by_place(STATE, STATE if given.state is None else given.state),
+            action=self._by_place(ACTION, ACTION if given.action is None else given.action),
+            episode=EPISODE if given.episode is None else given.episode,
+            time=TIME if given.time is None else given.time,
+        )
+
+    def _by_place(self, column: str, keys: Keys) -> Keys:
+        names = self.component_names(column)
+
+        def by_place(key: Key) -> Key:
+            # A column of that name comes first, as everywhere else.
+            return f"{column}[{names.index(key)}]" if key in names and key not in self.features else key
+
+        return by_place(keys) if isinstance(keys, Key) else [by_place(key) for key in keys]
 
 
 def opened(folder: str | os.PathLike[str]) -> LeRobot | None:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.readers import csv, npz, parquet
+from unconstrain.readers import csv, folder, npz, parquet
 from unconstrain.readers.differentiate import differentiate, spans_window
 from unconstrain.readers.files import Paths, existing, file_labels, recordings
-from unconstrain.readers.roles import Keys, assigned
+from unconstrain.readers.roles import Keys, Roles, assigned
 from unconstrain.readers.saved import read_saved
 from unconstrain.readers.splitting import GAP_STEPS, SUSPICIOUS, split
 from unconstrain.readers.stamps import PER_SECOND
@@ -61,7 +61,10 @@ def load(
     Parameters
     ----------
     paths : path, pattern such as ``"runs/*.csv"``, or several of them
+        A folder is one of Parquet files that are parts of one recording, or a LeRobot dataset (2.0, 2.1, 3.0), whose
+        columns have known names; `fit_stream` reads those that do not fit into memory.
     state, action : column, or list of columns
+        ``action="differentiate"`` insists on the derivative, where a dataset has actions too.
     time : column
         Seconds or nanoseconds (told by their step) or timestamps; must increase strictly within an episode.
         `Demonstrations.time` counts seconds from the first stamp of each episode as recorded.
@@ -109,25 +112,27 @@ def load(
             raise DataError(f"{name} must be a positive number, got {value!r}")
     if time_unit is not None and time_unit not in PER_SECOND:
         raise DataError(f"time_unit must be one of {', '.join(PER_SECOND)}, got {time_unit!r}")
-    if state is None and not (action is time is episode is force is free is None):
-        raise DataError(
-            "action, time, episode, force and free columns were given but no state columns; give state= too"
-        )
-
-    files = recordings(paths)
+    asked = Roles(state, action, time, episode, force, free)
+    files = folder.expanded(recordings(paths), asked)
     several = []
     for shown, label in zip(files, file_labels(files), strict=True):
-        path = existing(shown)
-        try:
-            demos = read_saved(path, shown) if state is None else None
-            table = READERS[path.suffix.lower()](path, shown) if demos is None else None
-        except OSError as error:
-            raise DataError(f"{shown} cannot be read: {error.strerror or error}") from error
-        differentiated = table is not None and action is None
+        demos, table, roles = None, None, asked
+        if folder.is_meant(shown):
+            table, roles = folder.read(shown, asked)
+        else:
+            path = existing(shown)
+            if state is None and asked != Roles():
+                raise DataError(
+                    "action, time, episode, force and free columns were given but no state columns; give state= too"
+                )
+            try:
+                demos = read_saved(path, shown) if state is None else None
+                table = READERS[path.suffix.lower()](path, shown) if demos is None else None
+            except OSError as error:
+                raise DataError(f"{shown} cannot be read: {error.strerror or error}") from error
+        differentiated = table is not None and roles.differentiated
         if table is not None:
-            demos = assigned(
-                table, label, len(files) > 1, state, action, time, episode, time_unit, force, free
-            )
+            demos = assigned(table, label, len(files) > 1, roles, time_unit)
         assert demos is not None
         if table is not None or gap is not None or max_speed is not None:
             demos = _split(demos, shown, differentiated, window, gap, max_speed, min_duration)

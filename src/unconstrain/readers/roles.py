@@ -1,6 +1,7 @@
 """Columns in their roles: which are states, which actions, which tell time and episodes."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +13,64 @@ from unconstrain.readers.table import Key, Table
 
 Keys = Key | Sequence[Key]
 
+DIFFERENTIATE = "differentiate"
+
+
+@dataclass(frozen=True)
+class Roles:
+    """Which columns are what, as the user says it: by name or position. Time, episode and free are one column each."""
+
+    state: Keys | None = None
+    action: Keys | None = None
+    time: Key | None = None
+    episode: Key | None = None
+    force: Keys | None = None
+    free: Key | None = None
+
+    @property
+    def differentiated(self) -> bool:
+        """Whether the actions are the derivative of the states."""
+        return self.action is None or self.action == DIFFERENTIATE
+
+    def positions(self, table: Table) -> dict[str, list[int]]:
+        """Where in a table the columns of each role are that is given.
+
+        Raises `DataError` for columns that do not exist, and for several where one is wanted.
+        """
+        several = {
+            "state": self.state,
+            "action": None if self.differentiated else self.action,
+            "force": self.force,
+        }
+        single = {"time": self.time, "episode": self.episode, "free": self.free}
+        return {
+            **{role: _positions(table, role, keys) for role, keys in several.items() if keys is not None},
+            **{role: [_position(table, role, key)] for role, key in single.items() if key is not None},
+        }
+
 
 def assigned(
-    table: Table,
-    label: str,
-    one_of_several: bool,
-    state: Keys | None,
-    action: Keys | None,
-    time: Key | None,
-    episode: Key | None,
-    time_unit: str | None,
-    force: Keys | None = None,
-    free: Key | None = None,
+    table: Table, label: str, one_of_several: bool, roles: Roles, time_unit: str | None
 ) -> Demonstrations:
     """The table's columns in their roles. Where no action column is given, the actions are still missing."""
-    if state is None:
+    if roles.state is None:
         raise DataError(f"{table.path} was not written by unconstrain, so say state=; {table.listing()}")
-    if action is None and time is None:
+    if roles.differentiated and roles.time is None:
         raise DataError(
             f"{table.path}: give action=, or time= so that the states can be differentiated; {table.listing()}"
         )
-    at_state = _positions(table, "state", state)
-    states = table.matrix("state", at_state)
-    actions, action_names = None, [f"{name}_dot" for name in _names(table, at_state, "x")]
-    if action is not None:
-        at_action = _positions(table, "action", action)
-        actions, action_names = table.matrix("action", at_action), _names(table, at_action, "u")
+    at = roles.positions(table)
+    states = table.matrix("state", at["state"])
+    actions, action_names = None, [f"{name}_dot" for name in _names(table, at["state"], "x")]
+    if "action" in at:
+        actions, action_names = table.matrix("action", at["action"]), _names(table, at["action"], "u")
         if len(actions) != len(states):
             raise DataError(
                 f"{table.path}: there are {len(states)} states but {len(actions)} actions; "
                 "there must be one action per state"
             )
-    forces = None if force is None else table.matrix("force", _positions(table, "force", force))
-    flags = None if free is None else table.matrix("free", [_position(table, "free", free)])[:, 0]
+    forces = table.matrix("force", at["force"]) if "force" in at else None
+    flags = table.matrix("free", at["free"])[:, 0] if "free" in at else None
     for name, values in (("forces", forces), ("free flags", flags)):
         if values is not None and len(values) != len(states):
             raise DataError(
@@ -52,8 +78,8 @@ def assigned(
             )
     codes = np.zeros(len(states), dtype=np.int64)
     labels: tuple[str, ...] = (label,)
-    if episode is not None:
-        codes, labels = table.labels(_position(table, "episode", episode))
+    if "episode" in at:
+        codes, labels = table.labels(at["episode"][0])
         if len(codes) != len(states):
             raise DataError(
                 f"{table.path}: there are {len(states)} states but {len(codes)} episode values; "
@@ -63,14 +89,14 @@ def assigned(
             labels = tuple(f"{label}:{value}" for value in labels)
     stamps: NDArray[np.float64] | None = None
     notes: list[str] = []
-    if time is not None:
-        stamps, notes = seconds(table, _position(table, "time", time), codes, time_unit)
+    if "time" in at:
+        stamps, notes = seconds(table, at["time"][0], codes, time_unit)
     return Demonstrations(
         states=states,
         actions=np.zeros_like(states) if actions is None else actions,
         episodes=codes,
         time=stamps,
-        state_names=_names(table, at_state, "x"),
+        state_names=_names(table, at["state"], "x"),
         action_names=action_names,
         episode_labels=labels,
         notes=notes,

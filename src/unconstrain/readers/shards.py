@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import PurePosixPath
@@ -206,6 +206,17 @@ class Shards:
         arrays = [self._column(piece, column) for column in columns]
         table = pa.Table.from_arrays(arrays, names=list(columns))
         return columns_of(table, self.name(piece.file), lambda index: row(piece.first + index))
+
+    def places(self, pieces: Sequence[Piece]) -> Callable[[int], str]:
+        """Where in the files a row of these pieces is, as a table's errors say it."""
+        bounds = np.cumsum([0, *(len(piece.rows) for piece in pieces)])
+
+        def place(index: int) -> str:
+            which = int(np.searchsorted(bounds, index, side="right")) - 1
+            piece = pieces[which]
+            return f"row {piece.first + index - bounds[which]} of {self.name(piece.file)} (counted from 0)"
+
+        return place
 
     def _fill(
         self, numbers: NDArray[Any], piece: Piece, column: str, places: list[tuple[int, int | None]]

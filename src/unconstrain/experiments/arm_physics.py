@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from unconstrain import atomic, figures, risk
+from unconstrain import atomic, figures
 from unconstrain.comparison import select_policy
 from unconstrain.experiments import arm_trials
+from unconstrain.experiments.errors import both
 from unconstrain.experiments.outcome import Outcome
 from unconstrain.experiments.trials import run_trials
 from unconstrain.plants import arm_dynamics
@@ -75,10 +76,9 @@ def _trial(scenario: str, seed: int, episodes: int) -> dict[str, Any]:
     }
     result: dict[str, Any] = {"chosen": found.name}
     for name, policy in policies.items():
-        P = policy.predict(test.states)
-        result[f"{name} nUPE"] = risk.normalized(risk.unconstrained_policy_error(test.policy, P), test.policy)
-        error = risk.constrained_policy_error(test.policy, P, test.projections)
-        result[f"{name} nCPE"] = risk.normalized(error, test.policy)
+        result |= {
+            f"{name} {error}": value for error, value in both(test, policy.predict(test.states)).items()
+        }
     angle = np.degrees(recording.off_projection())
     away = np.sum((everything.actions - recording.ideal) ** 2) / np.sum(recording.ideal**2)
     if scenario == TABLE:
@@ -89,9 +89,6 @@ def _trial(scenario: str, seed: int, episodes: int) -> dict[str, Any]:
         "angle, 90 %": float(np.nanpercentile(angle, 90)),
         "off the projection": float(np.sqrt(away)),
         "touching": float(recording.touching.mean()),
-        "force, median": float(
-            np.median(np.linalg.norm(recording.contact_force, axis=1)[recording.touching])
-        ),
     }
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from sklearn.preprocessing import SplineTransformer
 
-from unconstrain import risk
 from unconstrain.comparison import select_policy
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.experiments.errors import both, ncpe, nupe
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.plants import arm
 from unconstrain.plants.task import TaskConstraint
@@ -77,30 +77,11 @@ class Recordings:
 
 def errors(policy: Policy, recordings: Recordings) -> dict[str, float]:
     """nUPE and nCPE on held-out samples, nCPE under the complementary constraint, nUPE on new trajectories."""
-
-    measured = {
-        name: (held_out, policy.predict(held_out.states))
-        for name, held_out in (
-            ("test", recordings.test),
-            ("new", recordings.new),
-            ("complementary", recordings.complementary),
-        )
-    }
-
-    def unconstrained(name: str) -> float:
-        held_out, P = measured[name]
-        return risk.normalized(risk.unconstrained_policy_error(held_out.policy, P), held_out.policy)
-
-    def constrained(name: str) -> float:
-        held_out, P = measured[name]
-        error = risk.constrained_policy_error(held_out.policy, P, held_out.projections)
-        return risk.normalized(error, held_out.policy)
-
+    complementary, new = recordings.complementary, recordings.new
     return {
-        "nUPE": unconstrained("test"),
-        "nCPE": constrained("test"),
-        "complementary nCPE": constrained("complementary"),
-        "new nUPE": unconstrained("new"),
+        **both(recordings.test, policy.predict(recordings.test.states)),
+        "complementary nCPE": ncpe(complementary, policy.predict(complementary.states)),
+        "new nUPE": nupe(new, policy.predict(new.states)),
     }
 
 

@@ -1,6 +1,5 @@
 """Constraints learnt, measured, and used: beyond the paper, up to what later papers on learning constraints show."""
 
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from unconstrain import atomic, figures
+from unconstrain import figures
 from unconstrain.errors import UnconstrainError
 from unconstrain.experiments import constraints_figures
 from unconstrain.experiments.constraints_surfaces import BLOCKS, Surfaces, found
@@ -30,7 +29,7 @@ from unconstrain.experiments.constraints_trials import (
     measured_trial,
     trial,
 )
-from unconstrain.experiments.outcome import Outcome
+from unconstrain.experiments.outcome import Outcome, write_results
 from unconstrain.experiments.trials import run_trials
 from unconstrain.plants.robot import simulator
 
@@ -109,10 +108,7 @@ def reproduce(
         pictures["surfaces"] = (constraints_figures.surfaces(surfaces), caption)
 
     table = "\n\n".join(tables) + "\n"
-    with atomic.replacing(out / "trials.json") as temporary:
-        temporary.write_text(json.dumps(kept, indent=1) + "\n")
-    with atomic.replacing(out / "table.md") as temporary:
-        temporary.write_text(table)
+    files = write_results(out, kept, table)
     shown = {
         figures.save(figure, out / f"{name}.png"): caption for name, (figure, caption) in pictures.items()
     }
@@ -123,7 +119,7 @@ def reproduce(
         figures=shown,
         choices=CHOICES,
         findings=tuple(findings),
-        files=(out / "trials.json", out / "table.md", *drawn),
+        files=(*files, *drawn),
     )
 
 

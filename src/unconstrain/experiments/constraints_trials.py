@@ -13,6 +13,7 @@ from unconstrain.comparison import select_policy
 from unconstrain.constraints import from_forces, projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
+from unconstrain.experiments.errors import nupe
 from unconstrain.learnt_constraints import (
     ConstantConstraint,
     ConstraintChain,
@@ -203,8 +204,9 @@ def _felt(seed: int) -> dict[str, Any]:
             projections=known,
         )
         result[f"{name}, chosen"] = found.name
-        result[name] = _nupe(found.policy, test)
-        result[f"{name}, local models"] = _nupe(found.policies["locally linear"], test)
+        result[name] = nupe(test, found.policy.predict(test.states))
+        local = found.policies["locally linear"]
+        result[f"{name}, local models"] = nupe(test, local.predict(test.states))
     return result
 
 
@@ -219,14 +221,8 @@ def _grasp(seed: int) -> dict[str, float]:
     for name, N in (("inconsistency", None), ("projections", train.projections)):
         policy = LocallyLinearPolicy(centers="kmeans", n_centers=GRASP_MODELS, alpha="cv")
         policy.fit(train.states, train.actions, groups=train.episodes, projections=N)
-        result[name] = _nupe(policy, test)
+        result[name] = nupe(test, policy.predict(test.states))
     return result
-
-
-def _nupe(policy: Any, test: Demonstrations) -> float:
-    return risk.normalized(
-        risk.unconstrained_policy_error(test.policy, policy.predict(test.states)), test.policy
-    )
 
 
 def _stable(rng: np.random.Generator, d: int) -> Array:

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from rich.console import Console
 
-from unconstrain import atomic, figures, risk
+from unconstrain import atomic, figures
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.experiments.errors import both
 from unconstrain.experiments.outcome import Outcome
 from unconstrain.plants.finger import Box, Finger
 from unconstrain.policies import ParametricPolicy
@@ -60,13 +61,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
         for kind in ("inconsistency", "direct"):
             policies[kind] = ParametricPolicy(risk=kind, alpha="cv")
             policies[kind].fit(seen.states, seen.actions, groups=seen.episodes)
-            P = policies[kind].predict(unseen.states)
-            upe = risk.unconstrained_policy_error(unseen.policy, P)
-            cpe = risk.constrained_policy_error(unseen.policy, P, unseen.projections)
-            results[kind] = {
-                "nUPE": risk.normalized(upe, unseen.policy),
-                "nCPE": risk.normalized(cpe, unseen.policy),
-            }
+            results[kind] = both(unseen, policies[kind].predict(unseen.states))
         figure = figure_1(finger, free, blocked, seen, policies["inconsistency"], policies["direct"])
         out.mkdir(parents=True, exist_ok=True)
         png, svg = (figures.save(figure, out / f"fig1{suffix}") for suffix in (".png", ".svg"))

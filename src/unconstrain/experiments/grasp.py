@@ -1,6 +1,5 @@
 """Grasping a ball through a gap in a barrier (section 4.3, Table II)."""
 
-import json
 import os
 from collections import Counter
 from collections.abc import Iterable
@@ -14,12 +13,12 @@ from numpy.typing import NDArray
 from rich.console import Console
 from sklearn.preprocessing import PolynomialFeatures
 
-from unconstrain import atomic, risk
 from unconstrain.comparison import candidates, select_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.experiments import published
-from unconstrain.experiments.outcome import Outcome
+from unconstrain.experiments.errors import ncpe, nupe
+from unconstrain.experiments.outcome import Outcome, write_results
 from unconstrain.experiments.robots import OUR_OWN, RobotChoice
 from unconstrain.experiments.trials import run_trials
 from unconstrain.features import PotentialFeatures
@@ -56,10 +55,8 @@ HELD_OUT = 0.2
 def columns(demonstrator: Demonstrator, test: Demonstrations, P: Array) -> dict[str, float]:
     """Table II's three columns for predictions P (N, 6) at held-out states: one error, three projections of it."""
     assert test.policy is not None
-    assert test.projections is not None
     unseen, _ = constrain(demonstrator.scene.central(len(test)), test.states, test.policy)
-    upe = risk.normalized(risk.unconstrained_policy_error(test.policy, P), test.policy)
-    errors = (_normalized(test, P, test.projections), _normalized(test, P, unseen), upe)
+    errors = (ncpe(test, P), ncpe(test, P, unseen), nupe(test, P))
     return dict(zip(COLUMNS, errors, strict=True))
 
 
@@ -124,8 +121,7 @@ def trial(
         errors = columns(demonstrator, test.demonstrations, policy.predict(test.demonstrations.states))
         for movements, column in ((around, COLUMNS[1]), (free, COLUMNS[2])):
             M = movements.demonstrations
-            assert M.projections is not None
-            errors[f"{column}, moving"] = _normalized(M, policy.predict(M.states), M.projections)
+            errors[f"{column}, moving"] = ncpe(M, policy.predict(M.states))
         result[kind] = errors
         result[f"{kind} model"] = chosen
     return result | {
@@ -178,10 +174,7 @@ def reproduce(
         trials, out / "trials.jsonl", settings=settings, jobs=jobs, console=console, label="grasp",
     )  # fmt: skip
     table = _table(results)
-    with atomic.replacing(out / "trials.json") as temporary:
-        temporary.write_text(json.dumps({"settings": settings, "trials": results}, indent=1) + "\n")
-    with atomic.replacing(out / "table.md") as temporary:
-        temporary.write_text(table)
+    written = write_results(out, {"settings": settings, "trials": results}, table)
 
     console.print("drawing data set 0")
     recording, obstacle = training(demonstrator, 0)
@@ -189,7 +182,7 @@ def reproduce(
     policies["inconsistency"], _ = learn(recording.demonstrations, "inconsistency", model)
     policies["direct"], _ = learn(recording.demonstrations, "direct")
     pictures = grasp_figures.write(out, demonstrator, recording, obstacle, policies)
-    files = [out / "trials.json", out / "table.md", *pictures.files]
+    files = [*written, *pictures.files]
     if video is not None:
         console.print(f"filming into {video}")
         files.append(grasp_video.write(video, demonstrator, policies))
@@ -287,7 +280,3 @@ def _choices(demonstrator: Demonstrator) -> tuple[str, ...]:
         "inconsistency held out in five folds of movements (for the direct approach by its own risk).",
         f"Potential: a polynomial of degree {POTENTIAL_DEGREE} (--model potential; a candidate of --model auto).",
     )
-
-
-def _normalized(test: Demonstrations, P: Array, N: Array) -> float:
-    return risk.normalized(risk.constrained_policy_error(test.policy, P, N), test.policy)

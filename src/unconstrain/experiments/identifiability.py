@@ -1,6 +1,5 @@
 """What recordings cannot tell: is the report true, and is its advice worth following?"""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +7,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy.stats import spearmanr
 
-from unconstrain import atomic, figures
+from unconstrain import figures
 from unconstrain.experiments import identifiability_figures as drawing
 from unconstrain.experiments import identifiability_trials as trying
 from unconstrain.experiments.identifiability_surfaces import FILES, Surface, surfaces
-from unconstrain.experiments.outcome import Outcome
+from unconstrain.experiments.outcome import Outcome, write_results
 from unconstrain.experiments.trials import run_trials
 
 TRIALS = 20
@@ -46,10 +45,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
     )
     found = surfaces() if all(path.is_file() for path in FILES) else []
     table = "\n\n".join([_arm_table(results), _calibration_table(results), *_surface_table(found)]) + "\n"
-    with atomic.replacing(out / "trials.json") as temporary:
-        temporary.write_text(json.dumps({"settings": settings, "trials": results}, indent=1) + "\n")
-    with atomic.replacing(out / "table.md") as temporary:
-        temporary.write_text(table)
+    files = write_results(out, {"settings": settings, "trials": results}, table)
     pictures = {
         "toy": (
             drawing.toy(),
@@ -78,7 +74,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
         figures={path: pictures[name][1] for name, path in written.items()},
         choices=CHOICES,
         findings=_findings(results, found),
-        files=(out / "trials.json", out / "table.md"),
+        files=files,
     )
 
 

@@ -10,6 +10,7 @@ from unconstrain import risk
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.experiments import arm_trials
 from unconstrain.experiments import toy as toy_experiment
+from unconstrain.experiments.errors import nupe
 from unconstrain.features import DecoupledFeatures
 from unconstrain.identifiability import identifiability
 from unconstrain.plants import arm, toy
@@ -57,7 +58,7 @@ def told(policy: Policy, test: Demonstrations) -> dict[str, float]:
     error = np.abs(P - test.policy)
     ranks = spearmanr(np.linalg.norm(deviation, axis=1), np.linalg.norm(error, axis=1))
     return {
-        "nUPE": risk.normalized(risk.unconstrained_policy_error(test.policy, P), test.policy),
+        "nUPE": nupe(test, P),
         "coverage": float(np.mean(error <= NINETY * deviation)),
         "correlation": float(ranks.statistic),
     }
@@ -127,8 +128,7 @@ def _toy_advised(seed: int, way: str) -> list[float]:
     while True:
         seen = Demonstrations.concatenate(movements)
         policy = toy_experiment.model().fit(seen.states, seen.actions, groups=seen.episodes)
-        P = policy.predict(test.states)
-        errors.append(risk.normalized(risk.unconstrained_policy_error(test.policy, P), test.policy))
+        errors.append(nupe(test, policy.predict(test.states)))
         if len(movements) == TOY_MOST:
             return errors
         if way == "random":
@@ -171,8 +171,7 @@ def _arm_advised(seed: int, way: str) -> list[float]:
     while True:
         seen = Demonstrations.concatenate(movements)
         policy = arm_trials.local_models().fit(seen.states, seen.actions, groups=seen.episodes)
-        P = policy.predict(test.states)
-        errors.append(risk.normalized(risk.unconstrained_policy_error(test.policy, P), test.policy))
+        errors.append(nupe(test, policy.predict(test.states)))
         if len(movements) >= ARM_MOST:
             return errors
         pool = arm.starts(ARM_POOL, rng)

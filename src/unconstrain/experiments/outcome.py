@@ -1,7 +1,11 @@
 """What an experiment leaves behind, the same for all, so that one page can show them all."""
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from unconstrain import atomic
 
 
 @dataclass(frozen=True)
@@ -22,3 +26,12 @@ class Outcome:
     choices: tuple[str, ...] = ()
     findings: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+
+
+def write_results(out: Path, results: dict[str, Any], table: str) -> tuple[Path, Path]:
+    """Write `trials.json` and `table.md` into the folder `out`, each whole or not at all; their paths."""
+    texts = {"trials.json": json.dumps(results, indent=1) + "\n", "table.md": table}
+    for name, text in texts.items():
+        with atomic.replacing(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return out / "trials.json", out / "table.md"

@@ -1,6 +1,5 @@
 """A posture in 27 dimensions, with a wall in the way of the hands (section 4.4)."""
 
-import json
 import os
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -14,11 +13,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.console import Console
 
-from unconstrain import atomic, figures, risk
+from unconstrain import figures
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.experiments import published
-from unconstrain.experiments.outcome import Outcome
+from unconstrain.experiments.errors import both
+from unconstrain.experiments.outcome import Outcome, write_results
 from unconstrain.experiments.robots import OUR_OWN, RobotChoice
 from unconstrain.experiments.trials import run_trials
 from unconstrain.plants.barrier import CLEARANCE, Wall, blocking
@@ -152,16 +152,12 @@ def trial(
     everything, blocked = demonstrate(humanoid, n_episodes + held_out, length, random_state=seed)
     train = everything.select(everything.episodes < n_episodes)
     test = everything.select(everything.episodes >= n_episodes)
-    assert test.policy is not None
     result: dict[str, Any] = {}
     for kind in KINDS:
         policy = ParametricPolicy(risk=kind, alpha="cv").fit(
             train.states, train.actions, groups=train.episodes
         )
-        P = policy.predict(test.states)
-        upe = risk.unconstrained_policy_error(test.policy, P)
-        cpe = risk.constrained_policy_error(test.policy, P, test.projections)
-        result[kind] = {"nUPE": risk.normalized(upe, test.policy), "nCPE": risk.normalized(cpe, test.policy)}
+        result[kind] = both(test, policy.predict(test.states))
     blocked = blocked[: len(train)].reshape(n_episodes, length)
     result["samples the wall blocks"] = float(blocked.mean())
     result["movements that meet the wall"] = float(blocked.any(axis=1).mean())
@@ -190,10 +186,7 @@ def reproduce(
         trials or TRIALS, out / "trials.jsonl", settings=settings, jobs=jobs, console=console, label="posture",
     )  # fmt: skip
     table = _table(results)
-    with atomic.replacing(out / "trials.json") as temporary:
-        temporary.write_text(json.dumps({"settings": settings, "trials": results}, indent=1) + "\n")
-    with atomic.replacing(out / "table.md") as temporary:
-        temporary.write_text(table)
+    files = write_results(out, {"settings": settings, "trials": results}, table)
     figures.save(_figure(results), out / "errors.png")
     return Outcome(
         title=f"A posture in {n} dimensions, a wall in the hands' way (Sec. IV-D)",
@@ -203,7 +196,7 @@ def reproduce(
         },
         choices=CHOICES,
         findings=_findings(results, n),
-        files=(out / "trials.json", out / "table.md"),
+        files=files,
     )
 
 

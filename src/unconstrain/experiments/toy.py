@@ -1,6 +1,5 @@
 """The toy limit cycle (section 4.1): Figs. 3 and 4 over 100 data sets."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +8,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.console import Console
 
-from unconstrain import atomic, figures, risk
+from unconstrain import figures
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.experiments import published
-from unconstrain.experiments.outcome import Outcome
+from unconstrain.experiments.errors import both
+from unconstrain.experiments.outcome import Outcome, write_results
 from unconstrain.experiments.trials import run_trials
 from unconstrain.features import NormalizedRBF
 from unconstrain.plants import toy
@@ -52,10 +52,7 @@ def data(seed: int, noise: float = 0.0) -> tuple[Demonstrations, Demonstrations]
 
 def errors(policy: ParametricPolicy, held_out: Demonstrations) -> dict[str, float]:
     """nUPE and nCPE on held-out movements."""
-    P = policy.predict(held_out.states)
-    upe = risk.unconstrained_policy_error(held_out.policy, P)
-    cpe = risk.constrained_policy_error(held_out.policy, P, held_out.projections)
-    return {"nUPE": risk.normalized(upe, held_out.policy), "nCPE": risk.normalized(cpe, held_out.policy)}
+    return both(held_out, policy.predict(held_out.states))
 
 
 def learn(
@@ -92,10 +89,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
         trial, trials, out / "trials.jsonl", settings=settings, jobs=jobs, console=console, label="toy"
     )
     table = _table(results)
-    with atomic.replacing(out / "trials.json") as temporary:
-        temporary.write_text(json.dumps({"settings": settings, "trials": results}, indent=1) + "\n")
-    with atomic.replacing(out / "table.md") as temporary:
-        temporary.write_text(table)
+    files = write_results(out, {"settings": settings, "trials": results}, table)
     written = {
         name: [figures.save(figure, out / f"{name}{suffix}") for suffix in (".png", ".svg")]
         for name, figure in (("fig3", figure_3(results)), ("fig4", figure_4(results)))
@@ -112,7 +106,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
         figures={paths[0]: captions[name] for name, paths in written.items()},
         choices=CHOICES,
         findings=_findings(results),
-        files=(out / "trials.json", out / "table.md", *(paths[1] for paths in written.values())),
+        files=(*files, *(paths[1] for paths in written.values())),
     )
 
 

@@ -1,4 +1,4 @@
-"""The command line: `unconstrain demo | fit | evaluate | rollout | reproduce`."""
+"""The command line: one file a command, and what several of them share."""
 
 from unconstrain.cli.app import main
 

@@ -9,7 +9,6 @@ from rich.console import Console
 
 from unconstrain import constraint_figures, figures, risk
 from unconstrain.cli import recordings, reporting
-from unconstrain.cli.fit import describe, folds_of
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import NormalizedRBF
@@ -66,8 +65,8 @@ def constraints(
     console = reporting.console()
     with console.status("reading"):
         demos = recordings.read(files, how)
-    describe(console, demos)
-    groups = folds_of(demos, None)
+    recordings.describe(console, demos)
+    groups = recordings.folds_of(demos, None)
     with console.status("fitting"):
         learnt = estimator.fit(demos.states, demos.actions, groups=groups)
         N = held_out_projections(estimator, demos.states, demos.actions, groups)

@@ -7,7 +7,6 @@ import typer
 
 from unconstrain import figures
 from unconstrain.cli import models, recordings, reporting
-from unconstrain.cli.fit import Alpha, Centers, Folds, NCenters, Width, describe, folds_of
 from unconstrain.errors import PolicyError
 from unconstrain.identifiability import identifiability
 from unconstrain.identifiability.pictures import drawn
@@ -25,11 +24,11 @@ def diagnose(
     time: recordings.Time = None,
     episode: recordings.Episode = None,
     model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(CHOICES)}.")] = "locally-linear",
-    alpha: Alpha = "cv",
-    centers: Centers = None,
-    n_centers: NCenters = None,
-    width: Width = None,
-    folds: Folds = None,
+    alpha: models.Alpha = "cv",
+    centers: models.Centers = None,
+    n_centers: models.NCenters = None,
+    width: models.Width = None,
+    folds: recordings.Folds = None,
     k: Annotated[
         int, typer.Option("--most", "-k", min=1, help="How many regions and recordings to name.")
     ] = 3,
@@ -60,9 +59,9 @@ def diagnose(
     console = reporting.console()
     with console.status("reading"):
         demos = recordings.read(files, how)
-    describe(console, demos)
+    recordings.describe(console, demos)
     with console.status("fitting"):
-        policy.fit(demos.states, demos.actions, groups=folds_of(demos, folds))
+        policy.fit(demos.states, demos.actions, groups=recordings.folds_of(demos, folds))
     with console.status("diagnosing"):
         labels = [demos.episode_labels[code] for code in demos.episodes]
         report = identifiability(policy, demos.states, demos.actions, groups=labels, threshold=threshold)

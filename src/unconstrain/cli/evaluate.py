@@ -9,7 +9,6 @@ from rich.table import Table
 
 from unconstrain import risk, selection
 from unconstrain.cli import recordings, reporting
-from unconstrain.cli.fit import describe
 from unconstrain.errors import DataError
 from unconstrain.policies import load_policy
 
@@ -38,7 +37,7 @@ def evaluate(
     how = recordings.as_before(getattr(learnt, "recording_", {}), how)
     console = reporting.console()
     demos = recordings.read(files, how)
-    describe(console, demos)
+    recordings.describe(console, demos)
     if demos.states.shape[1] != learnt.n_features_in_ or demos.actions.shape[1] != learnt.n_actions_:
         raise DataError(
             f"{policy} maps {learnt.n_features_in_} states to {learnt.n_actions_} actions, but the recordings have "

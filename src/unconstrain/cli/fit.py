@@ -17,42 +17,15 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.identifiability import identifiability
 from unconstrain.policies.base import Policy
+from unconstrain.risk import unknown
 from unconstrain.validation import check_choice
 
 WORTH_A_WARNING = 0.1
 """Share of the policy that recordings leave undetermined."""
 
-BLOCKS = 5
-FOLDS = ("episodes", "blocks")
-
 Model = Annotated[str, typer.Option("--model", help=f"One of {', '.join(models.MODELS)}.")]
 Out = Annotated[Path, typer.Option("--out", help="Where the policy is saved.")]
 Risk = Annotated[str, typer.Option("--risk", help="inconsistency, or direct for ordinary regression.")]
-Alpha = Annotated[str, typer.Option("--alpha", help='Weight decay λ: a number, or "cv" to choose it.')]
-Centers = Annotated[
-    str | None, typer.Option("--centers", help="kmeans, grid or coverage, for models with centres.")
-]
-NCenters = Annotated[int | None, typer.Option("--n-centers", help="How many centres.")]
-Width = Annotated[
-    float | None, typer.Option("--width", help="σ of the receptive fields, in the states' unit.")
-]
-Folds = Annotated[
-    str | None,
-    typer.Option(
-        "--folds", help="What is held out: whole episodes, or blocks of each. Default: episodes, if several."
-    ),
-]
-Force = Annotated[
-    str | None,
-    typer.Option("--force", help="Columns of the contact force, one for each action.", metavar="fx,fy,fz"),
-]
-ForceThreshold = Annotated[
-    float | None, typer.Option("--force-threshold", help="A force above this is a contact, in its own unit.")
-]
-Free = Annotated[
-    str | None,
-    typer.Option("--free", help="Column with 1 where nothing constrained the motion.", metavar="COLUMN"),
-]
 Figure = Annotated[
     Path | None, typer.Option("--figure", help="Draw recorded movement and learnt policy (PNG, SVG, PDF).")
 ]
@@ -69,14 +42,14 @@ def fit(
     out: Out = Path("policy.skops"),
     figure: Figure = None,
     risk: Risk = "inconsistency",
-    alpha: Alpha = "cv",
-    centers: Centers = None,
-    n_centers: NCenters = None,
-    width: Width = None,
-    folds: Folds = None,
-    force: Force = None,
-    force_threshold: ForceThreshold = None,
-    free: Free = None,
+    alpha: models.Alpha = "cv",
+    centers: models.Centers = None,
+    n_centers: models.NCenters = None,
+    width: models.Width = None,
+    folds: recordings.Folds = None,
+    force: recordings.Force = None,
+    force_threshold: recordings.ForceThreshold = None,
+    free: recordings.Free = None,
     time_unit: recordings.TimeUnit = None,
     window: recordings.Window = None,
     gap: recordings.Gap = None,
@@ -95,7 +68,7 @@ def fit(
     check_choice(model, "--model", models.MODELS)
     check_choice(risk, "--risk", ("inconsistency", "direct"))
     if folds is not None:
-        check_choice(folds, "--folds", FOLDS)
+        check_choice(folds, "--folds", recordings.FOLDS)
     _check_known(force, force_threshold, free, risk)
     how, told = recordings.asked(context.params), recordings.told(context.params)
     named = _candidates(
@@ -119,15 +92,15 @@ def fit(
         return
     with console.status("reading"):
         demos = recordings.read(files, how | told)
-    describe(console, demos)
-    groups = folds_of(demos, folds)
+    recordings.describe(console, demos)
+    groups = recordings.folds_of(demos, folds)
     known = None
     if told:
         known = from_recording(demos, force_threshold=force_threshold)
         _describe_known(console, known)
 
-    chosen, table = _compare(console, demos, groups, model, named, risk, known)
-    policy = table.policies[chosen]
+    chosen, found = _compare(console, demos, groups, model, named, risk, known)
+    policy = found.policies[chosen]
     policy.recording_ = how
     policy.state_names_ = list(demos.state_names)
     console.print(
@@ -136,7 +109,7 @@ def fit(
     console.print(
         f"λ: {policy.alpha_:.3g}" + (" (chosen by cross-validation)" if policy.alpha == "cv" else "")
     )
-    _report(console, table, policy.risk)
+    _report(console, found, policy.risk)
     undetermined = (
         1.0 - identifiability(policy, demos.states, demos.actions, projections=known).determined_share
     )
@@ -164,18 +137,8 @@ def _point_on(console: Console, out: Path) -> None:
     console.print(f"  unconstrain evaluate {quoted(out)} OTHER_FILES...")
 
 
-def describe(console: Console, demos: Demonstrations) -> None:
-    """Say what was read: samples, episodes, and what the reader did to them."""
-    console.print(
-        f"read: {len(demos)} samples, {demos.n_episodes} episode{'s' if demos.n_episodes != 1 else ''}, "
-        f"states {', '.join(demos.state_names)}, actions {', '.join(demos.action_names)}"
-    )
-    for note in demos.notes:
-        console.print(f"note: {note}")
-
-
 def _candidates(model: str, **options) -> dict[str, Policy] | None:
-    """The model by name; None for "auto", whose candidates depend on the data."""
+    """The model by its name; None for "auto", whose candidates depend on the data."""
     if model != "auto":
         return {model: models.build(model, **options)}
     given = [name for name in ("centers", "n_centers", "width") if options[name] is not None]
@@ -184,15 +147,6 @@ def _candidates(model: str, **options) -> dict[str, Policy] | None:
             "--model auto makes its own choices: leave out --risk, --alpha, --centers, --n-centers, --width"
         )
     return None
-
-
-def folds_of(demos: Demonstrations, folds: str | None) -> np.ndarray:
-    """Episodes to be held out together, or blocks of each."""
-    folds = folds or ("episodes" if demos.n_episodes > 1 else "blocks")
-    check_choice(folds, "--folds", FOLDS)
-    if folds == "episodes" and demos.n_episodes < 2:
-        raise DataError("there is one episode, and none is left when it is held out: use --folds blocks")
-    return demos.episodes if folds == "episodes" else demos.blocks(BLOCKS)
 
 
 def _check_known(force: str | None, threshold: float | None, free: str | None, risk: str) -> None:
@@ -210,17 +164,26 @@ def _check_known(force: str | None, threshold: float | None, free: str | None, r
 
 def _describe_known(console: Console, N: np.ndarray) -> None:
     """Say of how many samples the constraint is known."""
-    unknown = np.isnan(N).any(axis=(1, 2))
-    identity = np.eye(N.shape[1])
-    free = np.isclose(N, identity, rtol=0, atol=0).all(axis=(1, 2))
+    hidden, free = unknown(N), (np.eye(N.shape[1]) == N).all(axis=(1, 2))
     console.print(
-        f"constraints: known of {np.mean(~unknown):.1%} of the samples ({np.mean(~unknown & ~free):.1%} in contact, "
-        f"{np.mean(free):.1%} free), not of {np.mean(unknown):.1%}"
+        f"constraints: known of {np.mean(~hidden):.1%} of the samples ({np.mean(~hidden & ~free):.1%} in contact, "
+        f"{np.mean(free):.1%} free), not of {np.mean(hidden):.1%}"
     )
 
 
-def _compare(console, demos, groups, model, named, risk, known) -> tuple[str, comparison.Selection]:
-    """The name of the policy asked for, and the comparison that holds it next to the other risk's."""
+def _compare(
+    console: Console,
+    demos: Demonstrations,
+    groups: np.ndarray,
+    model: str,
+    named: dict[str, Policy] | None,
+    risk: str,
+    known: np.ndarray | None,
+) -> tuple[str, comparison.Selection]:
+    """The name of the policy asked for, and the comparison that holds it next to the other risk's.
+
+    named: the model by its name, or None for a choice of models; known: projections (N, d, d), NaN where not known.
+    """
     data = (demos.states, demos.actions, groups)
     with console.status("fitting") as status:
 

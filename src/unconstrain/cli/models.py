@@ -1,6 +1,8 @@
-"""The models the command line can fit, by name."""
+"""The models the command line can fit, by name, and their options."""
 
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from unconstrain.errors import PolicyError
 from unconstrain.features import NormalizedRBF
@@ -9,6 +11,15 @@ from unconstrain.policies.base import Policy
 from unconstrain.validation import check_number
 
 MODELS = ("linear", "rbf", "locally-linear", "auto")
+
+Alpha = Annotated[str, typer.Option("--alpha", help='Weight decay λ: a number, or "cv" to choose it.')]
+Centers = Annotated[
+    str | None, typer.Option("--centers", help="kmeans, grid or coverage, for models with centres.")
+]
+NCenters = Annotated[int | None, typer.Option("--n-centers", help="How many centres.")]
+Width = Annotated[
+    float | None, typer.Option("--width", help="σ of the receptive fields, in the states' unit.")
+]
 
 
 def build(

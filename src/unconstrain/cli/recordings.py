@@ -1,15 +1,18 @@
-"""Options that say which recordings, and which of their columns; shared by the commands that read files."""
+"""Which recordings, which of their columns, and what is held out of them: shared by the commands that read files."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
+from rich.console import Console
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.readers import load
 from unconstrain.readers.roles import DIFFERENTIATE
+from unconstrain.validation import check_choice
 
 Files = Annotated[
     list[str],
@@ -53,6 +56,26 @@ MinDuration = Annotated[
     float | None,
     typer.Option("--min-duration", help="Drop fragments of split episodes shorter than this (s)."),
 ]
+Force = Annotated[
+    str | None,
+    typer.Option("--force", help="Columns of the contact force, one for each action.", metavar="fx,fy,fz"),
+]
+ForceThreshold = Annotated[
+    float | None, typer.Option("--force-threshold", help="A force above this is a contact, in its own unit.")
+]
+Free = Annotated[
+    str | None,
+    typer.Option("--free", help="Column with 1 where nothing constrained the motion.", metavar="COLUMN"),
+]
+Folds = Annotated[
+    str | None,
+    typer.Option(
+        "--folds", help="What is held out: whole episodes, or blocks of each. Default: episodes, if several."
+    ),
+]
+
+BLOCKS = 5
+FOLDS = ("episodes", "blocks")
 
 PLAIN = ("time_unit", "window", "gap", "max_speed", "min_speed", "min_duration")
 """Options that `load` takes as they are."""
@@ -116,6 +139,25 @@ def as_before(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
 def read(files: list[str], how: dict[str, Any]) -> Demonstrations:
     """The demonstrations in all the files."""
     return load(files, **how)
+
+
+def describe(console: Console, demos: Demonstrations) -> None:
+    """Say what was read: samples, episodes, and what the reader did to them."""
+    console.print(
+        f"read: {len(demos)} samples, {demos.n_episodes} episode{'s' if demos.n_episodes != 1 else ''}, "
+        f"states {', '.join(demos.state_names)}, actions {', '.join(demos.action_names)}"
+    )
+    for note in demos.notes:
+        console.print(f"note: {note}")
+
+
+def folds_of(demos: Demonstrations, folds: str | None) -> np.ndarray:
+    """Episodes to be held out together, or blocks of each."""
+    folds = folds or ("episodes" if demos.n_episodes > 1 else "blocks")
+    check_choice(folds, "--folds", FOLDS)
+    if folds == "episodes" and demos.n_episodes < 2:
+        raise DataError("there is one episode, and none is left when it is held out: use --folds blocks")
+    return demos.episodes if folds == "episodes" else demos.blocks(BLOCKS)
 
 
 def check_writable(*paths: Path | None) -> None:

@@ -148,7 +148,11 @@ class AlongMotion:
         return len(self.lengths)
 
     def __getitem__(self, index) -> "AlongMotion":
-        return AlongMotion(self.actions[index], self.lengths[index])
+        if isinstance(index, slice):
+            return AlongMotion(self.actions[index], self.lengths[index])
+        index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
+        # Stored a row a dimension, along which sums run.
+        return AlongMotion(self.actions.T.take(index, axis=1).T, self.lengths[index])
 
     @property
     def whole(self) -> bool:

@@ -250,7 +250,8 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             else:
                 index = np.flatnonzero(rows)
                 taken = None if weights is None else weights[index]
-                moments[k] = self._moments(X[index], seen[index], taken)
+                # Stored a row a dimension, along which sums run.
+                moments[k] = self._moments(X.T.take(index, axis=1).T, seen[index], taken)
         return Tally(
             tuple(moments),
             len(U),

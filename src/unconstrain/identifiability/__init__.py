@@ -8,6 +8,7 @@ advice.py       the recordings that would tell most
 episodes.py     which recordings tell most, and which could be dropped
 report.py       all of it in one object, `identifiability(policy, X, U)`
 words.py        and in sentences
+pictures.py     and drawn
 """
 
 from unconstrain.identifiability.report import Identifiability, identifiability

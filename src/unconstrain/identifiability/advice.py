@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unconstrain.features.centers import activations
-from unconstrain.policies import LocallyLinearPolicy
+from unconstrain.identifiability.information import seen_along, weights_of_models
 from unconstrain.policies.base import Policy
 from unconstrain.risk import sight
 from unconstrain.uncertainty import Posterior
@@ -44,7 +43,6 @@ class Planner:
     def __init__(self, policy: Policy, posterior: Posterior, candidates: np.ndarray, repeats: float):
         self.policy, self.X, self.repeats = policy, candidates, repeats
         self.posterior = posterior
-        self.local = isinstance(policy, LocallyLinearPolicy)
         everything = sight("direct", np.zeros((len(candidates), policy.n_actions_)))
         self.G = self._stack(policy._moments(candidates, everything).H)
         self.P = policy._evaluate(candidates)
@@ -55,12 +53,11 @@ class Planner:
 
     def gains(self, X: np.ndarray, directions: np.ndarray, criterion: str = "A") -> np.ndarray:
         """Of recordings at X (C, n) along directions (C, d): (C,); of A in squared units, summed over candidates."""
-        V, weights = self._seen(X, directions), self._weights(X)
-        noise = (
-            np.maximum(self._stack_of_numbers(self.posterior.noise), np.finfo(np.float64).tiny) / self.repeats
-        )
+        V, weights = seen_along(self.policy, X, directions), weights_of_models(self.policy, X)
         total = np.zeros(len(X))
-        for covariance, G, sigma2, weight in zip(self._covariance(), self.G, noise, weights.T, strict=True):
+        for covariance, G, sigma2, weight in zip(
+            self._covariance(), self.G, self._noise(), weights.T, strict=True
+        ):
             S = V @ covariance
             told = weight * np.einsum("cp,cp->c", S, V)
             if criterion == "D":
@@ -92,12 +89,9 @@ class Planner:
 
     def record(self, x: np.ndarray, q: np.ndarray) -> None:
         """Take the recording at x (1, n) along q (1, d) into the posterior."""
-        v, weights = self._seen(x, q)[0], self._weights(x)[0]
-        noise = (
-            np.maximum(self._stack_of_numbers(self.posterior.noise), np.finfo(np.float64).tiny) / self.repeats
-        )
+        v, weights = seen_along(self.policy, x, q)[0], weights_of_models(self.policy, x)[0]
         left = []
-        for covariance, sigma2, weight in zip(self._covariance(), noise, weights, strict=True):
+        for covariance, sigma2, weight in zip(self._covariance(), self._noise(), weights, strict=True):
             s = covariance @ v
             left.append(covariance - weight * np.outer(s, s) / (sigma2 + weight * (v @ s)))
         shape = self.posterior.covariance.shape
@@ -108,16 +102,9 @@ class Planner:
         parts = S.reshape(len(S), -1, len(G))
         return np.einsum("cjp,cjp->c", parts @ G, parts)
 
-    def _seen(self, X: np.ndarray, q: np.ndarray) -> np.ndarray:
-        if self.local:
-            return (q[:, :, None] * np.column_stack([X, np.ones(len(X))])[:, None, :]).reshape(len(X), -1)
-        return self.policy.features_.along(X, q)
-
-    def _weights(self, X: np.ndarray) -> np.ndarray:
-        """How much of a recording reaches each model, (C, S)."""
-        if self.local:
-            return activations(X, self.policy.centers_, self.policy.width_)
-        return np.ones((len(X), 1))
+    def _noise(self) -> np.ndarray:
+        """`σ²/r` of each model, (S,); never zero, since gains are divided by it."""
+        return np.maximum(np.atleast_1d(self.posterior.noise), np.finfo(np.float64).tiny) / self.repeats
 
     def _covariance(self) -> np.ndarray:
         return self._stack(self.posterior.covariance)
@@ -128,7 +115,3 @@ class Planner:
     @staticmethod
     def _stack(matrices: np.ndarray) -> np.ndarray:
         return matrices if matrices.ndim == 3 else matrices[None]
-
-    @staticmethod
-    def _stack_of_numbers(numbers: np.ndarray) -> np.ndarray:
-        return np.atleast_1d(numbers)

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unconstrain.features.centers import activations
-from unconstrain.identifiability.information import Information, stacked
+from unconstrain.identifiability.information import Information, seen_along, stacked, weights_of_models
 from unconstrain.identifiability.spectrum import directions, shares_seen
 from unconstrain.moments import Moments
 from unconstrain.parallel import blocks
-from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
 from unconstrain.risk import Sight
 
@@ -84,15 +82,9 @@ def leverages(
     result = np.zeros(len(X))
     width = max(root.shape[1] for root in roots) + information.moments.H.shape[-1]
     for rows in blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
-        block = X[rows]
-        local = isinstance(policy, LocallyLinearPolicy)
-        one = np.column_stack([block, np.ones(len(block))])
-        reach = activations(block, policy.centers_, policy.width_) if local else np.ones((len(block), 1))
-        looked = seen[rows].rows
+        looked, reached = seen[rows].rows, weights_of_models(policy, X[rows])
         for k in range(seen.n_rows):
-            q = looked[:, k]
-            full = (q[:, :, None] * one[:, None, :]).reshape(len(block), -1) if local else None
-            V = policy.features_.along(block, q) if full is None else full
-            for root, weight in zip(roots, reach.T, strict=True):
+            V = seen_along(policy, X[rows], looked[:, k])
+            for root, weight in zip(roots, reached.T, strict=True):
                 result[rows] += weight * np.sum((V @ root) ** 2, axis=1)
     return result * weights

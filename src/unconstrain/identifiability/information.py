@@ -19,6 +19,7 @@ import numpy as np
 from unconstrain import risk as risks
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features import FullFeatures, NormalizedRBF
+from unconstrain.features.centers import activations
 from unconstrain.moments import Moments
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
@@ -104,6 +105,21 @@ def shares_blocks(policy: Policy) -> bool:
     return isinstance(getattr(policy, "features_", None), FullFeatures) or isinstance(
         policy, LocallyLinearPolicy
     )
+
+
+def seen_along(policy: Policy, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """`Φ(x)ᵀq` of any of the models, (N, P), for states X (N, n) and directions (N, d)."""
+    if isinstance(policy, LocallyLinearPolicy):
+        features = np.column_stack([X, np.ones(len(X))])
+        return (directions[:, :, None] * features[:, None, :]).reshape(len(X), -1)
+    return policy.features_.along(X, directions)
+
+
+def weights_of_models(policy: Policy, X: np.ndarray) -> np.ndarray:
+    """How much of a sample at X (N, n) reaches each of S models, (N, S): activations, or ones for a single model."""
+    if isinstance(policy, LocallyLinearPolicy):
+        return activations(X, policy.centers_, policy.width_)
+    return np.ones((len(X), 1))
 
 
 def _traced(H: np.ndarray, d: int) -> np.ndarray:

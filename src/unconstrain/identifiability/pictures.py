@@ -22,7 +22,7 @@ def drawn(report: Identifiability, state_names) -> Figure:
     Over two states and two actions: as a field, with ellipses of one standard deviation. Otherwise: recorded states
     projected onto pairs of the first three coordinates, coloured by the largest standard deviation in any direction.
     """
-    X = report._needed("where to draw").X
+    X = report.recordings_for("where to draw").X
     n, d = X.shape[1], report.policy.n_actions_
     pairs = [(0, 1), (0, 2), (1, 2)] if n > 2 else [(0, 1)] if n == 2 else [(0, 0)]
     figure = Figure(figsize=(4.6 * (len(pairs) + 1), 4.4), layout="constrained")

@@ -17,11 +17,19 @@ from unconstrain.identifiability.coverage import Coverage, coverage
 from unconstrain.identifiability.episodes import Contribution, contributions
 from unconstrain.identifiability.information import Information
 from unconstrain.identifiability.spectrum import THRESHOLD, shares_seen
+from unconstrain.identifiability.words import described
 from unconstrain.moments import Moments
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
 from unconstrain.uncertainty import Posterior
-from unconstrain.validation import check_choice, check_groups, check_number, check_states, check_weights
+from unconstrain.validation import (
+    check_actions,
+    check_choice,
+    check_groups,
+    check_number,
+    check_states,
+    check_weights,
+)
 
 POOL = 200
 """Candidate states for the next recording, spread over the recorded ones, where none are given."""
@@ -62,7 +70,7 @@ def identifiability(
     X = check_states(policy, X)
     groups, weights = check_groups(groups, len(X)), check_weights(sample_weight, X)
     N = None if projections is None else np.asarray(projections, dtype=np.float64)[counted]
-    U = risks.check_actions(U)[counted]
+    U = check_actions(U)[counted]
     recordings = Recordings(X[counted], U, weights[counted], None if groups is None else groups[counted], N)
     return Identifiability(policy, information, threshold, recordings, len(counted) - len(U))
 
@@ -176,7 +184,7 @@ class Identifiability:
 
         reach: σ of what "near" means, in units of the states; by default `self.reach`.
         """
-        near = self._needed("which directions were seen near a state")
+        near = self.recordings_for("which directions were seen near a state")
         width = self.reach if reach is None else check_number(reach, "reach", positive=True)
         return coverage(check_states(self.policy, X), near.X, near.U, width)
 
@@ -186,7 +194,7 @@ class Identifiability:
 
         Not the model's width: how far a model generalises is an assumption, what was seen near a state is not.
         """
-        X = self._needed("how far apart the states lie").X
+        X = self.recordings_for("how far apart the states lie").X
         spread = float(np.sqrt(np.mean(np.var(X, axis=0))))
         return spread * len(X) ** (-1.0 / (X.shape[1] + 4)) or 1.0
 
@@ -195,7 +203,7 @@ class Identifiability:
 
         Ordered by the posterior's largest standard deviation. The direction is that of the motion least seen there.
         """
-        near = self._needed("where the policy is known least")
+        near = self.recordings_for("where the policy is known least")
         pool, radius = farthest_first(near.X, n_centers=POOL)
         covariance = self.covariance(pool)
         speeds = np.linalg.norm(self.policy._evaluate(pool), axis=1)
@@ -232,14 +240,14 @@ class Identifiability:
 
         X (C, n): where each begins; directions (C, d): along which it moves. Returns (C,).
         """
-        q = risks.check_actions(directions, "directions")
+        q = check_actions(directions, "directions")
         planner = self.planner(candidates, length)
         return planner.gains(check_states(self.policy, X), risks.directions(q)[0]) / len(planner.X)
 
     def planner(self, candidates=None, length=None) -> Planner:
         """For recordings chosen one after the other by other rules than `next_recordings`."""
         if candidates is None:
-            candidates = farthest_first(self._needed("where to record").X, n_centers=POOL)[0]
+            candidates = farthest_first(self.recordings_for("where to record").X, n_centers=POOL)[0]
         if length is None:
             known = self.recordings.episodes if self.recordings is not None else None
             length = 1.0 if known is None else len(known) / len(np.unique(known))
@@ -248,7 +256,7 @@ class Identifiability:
 
     def contributions(self) -> list[Contribution]:
         """How many of the determined directions each episode holds, and which could go: see `episodes`."""
-        near = self._needed("which episodes contribute")
+        near = self.recordings_for("which episodes contribute")
         if near.episodes is None:
             raise DataError(
                 "which episodes contribute needs to know them: identifiability(policy, X, U, groups=...)"
@@ -273,8 +281,6 @@ class Identifiability:
 
     def describe(self, state_names: Sequence[str], action_names: Sequence[str], k: int = 3) -> str:
         """The report in sentences, with the user's own names of states and actions."""
-        from unconstrain.identifiability.words import described
-
         return described(self, state_names, action_names, k)
 
     @property
@@ -302,7 +308,8 @@ class Identifiability:
         seen = self.information.moments
         return float(np.sum(seen.squares) / np.sum(seen.weight))
 
-    def _needed(self, what: str) -> Recordings:
+    def recordings_for(self, what: str) -> Recordings:
+        """The recordings that are needed to say `what`. Raises `DataError` for a report of moments alone."""
         if self.recordings is None:
             raise DataError(f"to say {what}, the recordings are needed: identifiability(policy, X, U)")
         return self.recordings

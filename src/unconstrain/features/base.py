@@ -8,6 +8,8 @@ potential features differ in nothing else.
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from sklearn.base import clone
+from sklearn.utils.validation import has_fit_parameter
 
 from unconstrain.errors import PolicyError
 
@@ -36,6 +38,12 @@ def is_policy_features(candidate) -> bool:
     """Whether `candidate`, fitted or not, speaks the protocol; the number of parameters is known only once fitted."""
     named = all(callable(getattr(candidate, name, None)) for name in ("fit", "along", "evaluate"))
     return named and not isinstance(candidate, type)
+
+
+def fitted(transformer, X: np.ndarray, sample_weight: np.ndarray | None):
+    """A copy of a scikit-learn transformer, fitted to states X (N, n), with weights (N,) where it takes them."""
+    weighted = sample_weight is not None and has_fit_parameter(transformer, "sample_weight")
+    return clone(transformer).fit(X, **({"sample_weight": sample_weight} if weighted else {}))
 
 
 def check_square(name: str, X: np.ndarray, d: int) -> None:

@@ -7,9 +7,9 @@ Source: ICRA 2009, Sec. III-A.
 
 import numpy as np
 from sklearn.base import BaseEstimator, clone
-from sklearn.utils.validation import has_fit_parameter
 
 from unconstrain.errors import PolicyError
+from unconstrain.features.base import PolicyFeatures, fitted, is_policy_features
 
 
 class FullFeatures(BaseEstimator):
@@ -30,12 +30,7 @@ class FullFeatures(BaseEstimator):
 
     def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "FullFeatures":
         """Fit the transformer to states X (N, n), with weights (N,) where it takes them."""
-        self.transformer_ = None
-        if self.transformer is not None:
-            weighted = sample_weight is not None and has_fit_parameter(self.transformer, "sample_weight")
-            self.transformer_ = clone(self.transformer).fit(
-                X, **({"sample_weight": sample_weight} if weighted else {})
-            )
+        self.transformer_ = None if self.transformer is None else fitted(self.transformer, X, sample_weight)
         self.n_actions_ = d
         self.n_basis_ = self.basis(X[:1]).shape[1]
         self.n_parameters_ = d * self.n_basis_
@@ -56,3 +51,11 @@ class FullFeatures(BaseEstimator):
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """`pi(x) = W b(x)`: actions (N, d) at states X (N, n) for parameters w (dM,)."""
         return self.basis(X) @ w.reshape(self.n_actions_, -1).T
+
+
+def as_policy_features(given) -> PolicyFeatures:
+    """What `features=` stands for, not fitted yet: a copy of policy features, or the full features on a transformer.
+
+    Raises `PolicyError` for anything that is neither, nor None.
+    """
+    return clone(given) if is_policy_features(given) else FullFeatures(given)

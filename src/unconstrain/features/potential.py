@@ -6,10 +6,9 @@ movements are often of this kind. What circulates, such as a limit cycle, is not
 """
 
 import numpy as np
-from sklearn.base import BaseEstimator, clone
-from sklearn.utils.validation import has_fit_parameter
+from sklearn.base import BaseEstimator
 
-from unconstrain.features.base import check_square
+from unconstrain.features.base import check_square, fitted
 from unconstrain.features.derivatives import check_differentiable, gradient, slopes
 from unconstrain.features.rbf import NormalizedRBF
 
@@ -47,9 +46,7 @@ class PotentialFeatures(BaseEstimator):
         check_square("PotentialFeatures", X, d)
         basis = NormalizedRBF(100) if self.basis is None else self.basis
         check_differentiable(basis)
-        basis = clone(basis)
-        weighted = sample_weight is not None and has_fit_parameter(basis, "sample_weight")
-        self.basis_ = basis.fit(X, **({"sample_weight": sample_weight} if weighted else {}))
+        self.basis_ = fitted(basis, X, sample_weight)
         self.n_parameters_ = self.basis_.transform(X[:1]).shape[1]
         return self
 

@@ -2,12 +2,11 @@
 
 import numpy as np
 from scipy.optimize import least_squares
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.errors import DataError
-from unconstrain.features import FullFeatures
-from unconstrain.features.base import is_policy_features
+from unconstrain.features.full import as_policy_features
 from unconstrain.validation import check_actions, check_number, check_samples, check_states
 
 
@@ -46,8 +45,7 @@ class NullspaceComponent(BaseEstimator):
             raise DataError("a task and a nullspace component need two or more actions between them, got 1")
         if not U.any():
             raise DataError("all actions are zero: there is nothing to separate")
-        features = clone(self.features) if is_policy_features(self.features) else FullFeatures(self.features)
-        self.features_ = features.fit(X, U.shape[1])
+        self.features_ = as_policy_features(self.features).fit(X, U.shape[1])
         self.n_actions_ = U.shape[1]
         scale = np.sqrt(np.mean(np.sum(U**2, axis=1)))
         V = U / scale

@@ -20,10 +20,9 @@ the share of motion along the unit row on held-out episodes.
 """
 
 import numpy as np
-from sklearn.base import clone
 
-from unconstrain.features import FullFeatures
 from unconstrain.features.base import is_policy_features
+from unconstrain.features.full import as_policy_features
 from unconstrain.learnt_constraints.base import LearntConstraint
 from unconstrain.learnt_constraints.jacobian import JacobianFeatures
 from unconstrain.learnt_constraints.spectrum import count, listed
@@ -236,8 +235,5 @@ def _normalised(rows: np.ndarray) -> np.ndarray:
 
 
 def _features(given):
-    if is_policy_features(given):
-        return clone(given)
-    if callable(given) and not hasattr(given, "transform"):
-        return JacobianFeatures(given)
-    return FullFeatures(given)
+    a_jacobian = callable(given) and not is_policy_features(given) and not hasattr(given, "transform")
+    return JacobianFeatures(given) if a_jacobian else as_policy_features(given)

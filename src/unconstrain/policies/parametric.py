@@ -1,11 +1,9 @@
 """`pi(x) = Φ(x) w`: one set of parameters for all states. Source: ICRA 2009, Sec. III-A."""
 
 import numpy as np
-from sklearn.base import clone
 
 from unconstrain.accumulation import parametric_moments
-from unconstrain.features import FullFeatures
-from unconstrain.features.base import is_policy_features
+from unconstrain.features.full import as_policy_features
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
 from unconstrain.risk import Sight
@@ -43,8 +41,7 @@ class ParametricPolicy(Policy):
         self.alpha = alpha
 
     def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:
-        features = clone(self.features) if is_policy_features(self.features) else FullFeatures(self.features)
-        self.features_ = features.fit(X, d, weights)
+        self.features_ = as_policy_features(self.features).fit(X, d, weights)
 
     def _placed_by_data(self) -> bool:
         return self.features is not None

@@ -21,6 +21,7 @@ from unconstrain.policies.base import Policy
 from unconstrain.policies.tally import Tally
 from unconstrain.progress import Report, reporting
 from unconstrain.readers.dataset import Dataset
+from unconstrain.readers.reading import Reading
 from unconstrain.readers.roles import Keys
 from unconstrain.readers.table import Key
 from unconstrain.selection import EpisodeFolds
@@ -90,7 +91,12 @@ def fit(
 
     All else as for `fit_stream`. Raises what it raises, and `UnconstrainError` where the cluster fails.
     """
-    work, opened = prepared(locals())
+    reading = Reading(
+        state=state, action=action, episode=episode, time=time, projections=projections, force=force,
+        force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
+        min_duration=min_duration,
+    )  # fmt: skip
+    work, opened = prepared(policy, source, reading, batch_rows, partial=partial)
     if not isinstance(opened, Dataset):
         raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
     longest = begin(work, opened, sample_rows, random_state, partial=partial)

@@ -8,7 +8,7 @@ and, where the states are differentiated or forces filtered, the longest episode
 import os
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from copy import deepcopy
@@ -117,11 +117,17 @@ def fit_stream(
     DataError
         Data that cannot be read or used, in a sentence that names the file and the row.
     PolicyError
-        A policy with impossible options, or one that needs what a stream does not carry.
+        A policy with impossible options, or one that needs what the source does not tell: episodes for
+        ``alpha="cv"``, projections for ``risk="constrained"``.
     UnconstrainError
         A checkpoint that belongs to something else or is damaged.
     """
-    work, opened = prepared(locals())
+    reading = Reading(
+        state=state, action=action, episode=episode, time=time, projections=projections, force=force,
+        force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
+        min_duration=min_duration,
+    )  # fmt: skip
+    work, opened = prepared(policy, source, reading, batch_rows, partial=partial)
     settings = {"batch_rows": batch_rows, "sample_rows": sample_rows, "random_state": random_state}
     belongs_to: dict[str, str] = {}
     resumed = None
@@ -153,26 +159,27 @@ def fit_stream(
     return finish(policy, reached.policy, reached.tally)
 
 
-def prepared(arguments: Mapping[str, Any]) -> tuple[Policy, Source]:
-    """The policy to go on with and the source, opened: what the arguments of `fit_stream` and `distributed.fit` say.
+def prepared(
+    policy: Policy, source: Any, reading: Reading, batch_rows: int, *, partial: bool
+) -> tuple[Policy, Source]:
+    """The policy to go on with, a copy, and the source, opened; all as for `fit_stream`.
 
-    The policy is a copy. Raises `PolicyError` for one that cannot be learnt from this source.
+    Raises `PolicyError` for a policy that cannot be learnt from this source.
     """
-    policy = arguments["policy"]
     if not isinstance(policy, Policy):
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")
     policy._check_options()
     complete = policy.risk == "constrained"
-    source = _opened(arguments["source"], Reading.among(arguments), arguments["batch_rows"], complete)
-    if source.tells_constraints:
+    opened = _opened(source, reading, batch_rows, complete)
+    if opened.tells_constraints:
         policy._check_uses_projections()
     elif complete:
         raise PolicyError(
             'risk="constrained" needs the projections of the samples: name columns with projections=, or with force= '
             "and free=, or give batches (X, U, groups, projections)"
         )
-    goes_on = arguments["partial"] and hasattr(policy, "moments_")
-    return deepcopy(policy) if goes_on else clone(policy), source
+    goes_on = partial and hasattr(policy, "moments_")
+    return deepcopy(policy) if goes_on else clone(policy), opened
 
 
 def _opened(source: Any, reading: Reading, batch_rows: int, complete: bool) -> Source:

@@ -1,8 +1,6 @@
 """How files are to be read as a stream, as the user says it: which columns are what."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 from unconstrain.errors import DataError
 from unconstrain.readers.roles import Keys
@@ -44,11 +42,6 @@ class Reading:
             )
         if self.force is None and self.force_threshold is not None:
             raise DataError("force_threshold is for forces: name their columns with force=")
-
-    @classmethod
-    def among(cls, arguments: Mapping[str, Any]) -> "Reading":
-        """Those of a function's arguments that are about files."""
-        return cls(**{field.name: arguments[field.name] for field in fields(cls)})
 
     @property
     def columns(self) -> list[str]:

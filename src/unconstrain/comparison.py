@@ -114,9 +114,8 @@ def candidates(n: int, d: int) -> dict[str, Policy]:
     Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
     even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
     """
-    models = np.clip(
-        MOST_PARAMETERS**3 // (d * (n + 1)) ** 3, 1, MOST_CENTERS
-    )  # each solves for d (n + 1) numbers
+    # Each local model solves for d (n + 1) numbers by itself, which costs their cube.
+    models = np.clip(MOST_PARAMETERS**3 // (d * (n + 1)) ** 3, 1, MOST_CENTERS)
     centers = np.clip(MOST_PARAMETERS // d, 2, MOST_CENTERS)
     named: dict[str, Policy] = {
         "linear": ParametricPolicy(alpha="cv"),
@@ -151,6 +150,8 @@ def select_policy(
         `candidates(n, d)` makes. They are cloned, never changed.
     X (N, n), U (N, d): states and actions. groups (N,): episodes, which are held out whole; without them contiguous
         blocks are.
+    projections: N (N, d, d), what is known of the constraints, all NaN where it is not; candidates are then judged by
+        `risk.auto`, and those whose risk is "auto" or "constrained" learn from it.
     n_jobs: candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
     progress: called with each candidate's `Row` once it is done, in the order given.
 
@@ -169,7 +170,8 @@ def select_policy(
     named = _named(candidates, X.shape[1], actions.shape[1])
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
-    list(selection.splits(len(X), groups))
+    # What no candidate could be judged on is told here, as the mistake it is, and not as each one's failure.
+    next(selection.splits(len(X), groups))
     selection.explained(actions, np.zeros_like(actions))
 
     parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")

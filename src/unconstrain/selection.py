@@ -1,9 +1,8 @@
-"""Choosing the weight decay λ from folds of moments, and judging a policy on episodes it has not seen."""
+"""Dealing episodes out to folds, choosing the weight decay λ from moments by fold, and what a policy explains."""
 
 from collections.abc import Iterator
 
 import numpy as np
-from sklearn.base import clone
 
 from unconstrain import risk
 from unconstrain.errors import DataError
@@ -84,25 +83,12 @@ def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray,
     return float(alphas[as_good].max()), alphas, error
 
 
-def held_out_predictions(policy, X, U, groups=None, n_folds: int = 5, **fit_params) -> np.ndarray:
-    """Predictions (N, d) for every sample by copies of `policy` fitted to the folds it is not in.
+def splits(n_samples: int, groups=None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Rows to train on and rows to test on, a pair a fold, dealt out as `EpisodeFolds` does.
 
-    X (N, n), U (N, d), groups (N,); `fit_params` are arrays of N entries handed to `fit`, such as `projections`.
-    Choices made while fitting (λ, centres) are made anew on each training part, so nothing leaks.
+    groups: episode labels (N,), or None. Raises `DataError` where there is one fold only.
     """
-    U = np.asarray(U, dtype=np.float64)
-    predictions = np.empty_like(U)
-    for train, test in splits(len(U), groups, n_folds):
-        params = {name: value[train] for name, value in fit_params.items()}
-        if groups is not None and len(np.unique(np.asarray(groups)[train])) > 1:
-            params["groups"] = np.asarray(groups)[train]
-        predictions[test] = clone(policy).fit(X[train], U[train], **params).predict(X[test])
-    return predictions
-
-
-def splits(n_samples: int, groups=None, n_folds: int = 5) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows to train on and rows to test on, a pair a fold, dealt out as `EpisodeFolds` does."""
-    fold = EpisodeFolds(n_folds).assign(None if groups is None else np.asarray(groups), n_samples)
+    fold = EpisodeFolds().assign(None if groups is None else np.asarray(groups), n_samples)
     present = np.unique(fold)
     if len(present) < 2:
         raise DataError(

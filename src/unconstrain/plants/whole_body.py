@@ -161,9 +161,8 @@ class WholeBody:
         costs = np.full(self.model.nv, POSTURE_COST)
         for foot in self.humanoid.feet or ():
             body = self._body(foot)
-            while self.model.body_parentid[
-                body
-            ]:  # up to the pelvis, the body that has the world for a parent
+            # Up to the pelvis, the body that has the world for a parent.
+            while self.model.body_parentid[body]:
                 first = self.model.body_dofadr[body]
                 costs[first : first + self.model.body_dofnum[body]] = LEG_COST * POSTURE_COST
                 body = self.model.body_parentid[body]

@@ -58,10 +58,8 @@ class Posterior:
         batch, P = moments.squares.shape, moments.H.shape[-1]
         search = _Evidence(moments, numbers_per_sample)
         decay = search.decay()
-        noise, log_evidence = (
-            search.noise(np.log(decay), search.every),
-            -search.surprise(np.log(decay), search.every),
-        )
+        noise = search.noise(np.log(decay), search.every)
+        log_evidence = -search.surprise(np.log(decay), search.every)
         # Cholesky, not the eigenvectors at hand: it leaves Σ positive however wide the eigenvalues lie apart.
         regular = moments.H.reshape(-1, P, P) + decay[:, None, None] * np.eye(P)
         inverse = np.stack([cho_solve(cho_factor(one), np.eye(P)) for one in regular])

@@ -7,6 +7,7 @@ import typer
 from rich.console import Console
 
 import unconstrain
+from unconstrain.cli import reporting
 from unconstrain.cli.constraints import constraints
 from unconstrain.cli.demo import demo
 from unconstrain.cli.diagnose import diagnose
@@ -16,8 +17,6 @@ from unconstrain.cli.reproduce import reproduce
 from unconstrain.cli.rollout import rollout
 from unconstrain.cli.view import view
 from unconstrain.errors import UnconstrainError
-
-INTERRUPTED = 130
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -57,7 +56,7 @@ def main() -> None:
         )
         sys.exit(2)
     except SystemExit as end:
-        if end.code == INTERRUPTED:  # typer turns Ctrl-C into this without a word
+        if end.code == reporting.INTERRUPTED:  # typer turns Ctrl-C into this without a word
             print("interrupted: nothing was left half written", file=sys.stderr)
         raise
     except BrokenPipeError:

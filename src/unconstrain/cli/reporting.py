@@ -5,6 +5,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+INTERRUPTED = 130
+"""The exit code after Ctrl-C, as shells have it."""
+
 
 def console() -> Console:
     """A console that takes text literally: brackets in names of files and columns are no markup."""

@@ -7,12 +7,11 @@ import typer
 from rich.console import Console
 
 from unconstrain import distributed
+from unconstrain.cli import reporting
 from unconstrain.errors import PolicyError
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
 from unconstrain.stream import fit_stream
-
-INTERRUPTED = 130
 
 Checkpoint = Annotated[
     Path | None,
@@ -66,7 +65,7 @@ def learn(
     except KeyboardInterrupt as stop:
         if str(stop):
             Console(stderr=True).print(str(stop), soft_wrap=True, highlight=False)
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(reporting.INTERRUPTED) from None
     _describe(console, policy)
     return policy
 

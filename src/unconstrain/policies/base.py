@@ -293,14 +293,13 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             )
 
     def _checked_projections(self, projections, U: np.ndarray) -> np.ndarray | None:
-        if projections is not None:
-            self._check_uses_projections()
-        if projections is None and self.risk != "constrained":
-            return None
         if projections is None:
-            raise PolicyError(
-                'risk="constrained" needs the projections of the samples: fit(X, U, projections=N)'
-            )
+            if self.risk == "constrained":
+                raise PolicyError(
+                    'risk="constrained" needs the projections of the samples: fit(X, U, projections=N)'
+                )
+            return None
+        self._check_uses_projections()
         return check_projections(projections, *U.shape, unknown=self.risk == "auto")
 
     def _solve(self) -> None:

@@ -66,5 +66,9 @@ def found(demonstrations: Demonstrations, constraint: LearntConstraint) -> Figur
 
 def aligned(rows: np.ndarray) -> np.ndarray:
     """Rows (N, d) with their signs turned the same way: a row and its negative are the same constraint."""
-    middle = np.linalg.eigh(rows.T @ rows)[1][:, -1]
-    return rows * np.where(rows @ middle < 0, -1.0, 1.0)[:, None]
+    return rows * np.where(rows @ middle(rows) < 0, -1.0, 1.0)[:, None]
+
+
+def middle(rows: np.ndarray) -> np.ndarray:
+    """The unit vector (d,) nearest to unit rows (N, d), whatever their signs."""
+    return np.linalg.eigh(rows.T @ rows)[1][:, -1]

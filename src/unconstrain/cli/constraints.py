@@ -100,9 +100,10 @@ def _report(console: Console, demos: Demonstrations, learnt: LearntConstraint) -
         console.print(f"how sure: standard error of the direction {np.degrees(learnt.uncertainty_):.2g}°")
         return
     for j in range(A.shape[1]):
-        mean, spread = _middle(A[:, j])
+        mean = constraint_figures.middle(A[:, j])
+        turned = np.degrees(np.arccos(np.clip(np.abs(A[:, j] @ mean), 0.0, 1.0)))
         console.print(
-            f"  {equation(mean, names)}   on average; it turns by {np.degrees(spread):.0f}° (median)"
+            f"  {equation(mean, names)}   on average; it turns by {np.median(turned):.0f}° (median)"
         )
 
 
@@ -114,9 +115,3 @@ def equation(row: np.ndarray, names: tuple[str, ...]) -> str:
         if abs(row[i]) >= 0.0005:
             text += f" {'-' if row[i] < 0 else '+'} {abs(row[i]):.3f} {names[i]}"
     return text.removeprefix(" + ") + " ≈ 0"
-
-
-def _middle(rows: np.ndarray) -> tuple[np.ndarray, float]:
-    """The direction nearest to unit rows (N, d), whatever their signs, and the median angle to it (rad)."""
-    middle = np.linalg.eigh(rows.T @ rows)[1][:, -1]
-    return middle, float(np.median(np.arccos(np.clip(np.abs(rows @ middle), 0.0, 1.0))))

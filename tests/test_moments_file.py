@@ -120,11 +120,11 @@ def zipped(path):
         (flipped, "m.npz is damaged"),
         (without_a_fold, "m.npz is damaged"),
         (newer, "written by unconstrain 9.9, in a newer format"),
-        (foreign, "does not hold moments saved by unconstrain"),
-        (single, "does not hold moments saved by unconstrain"),
-        (zipped, "does not hold moments saved by unconstrain"),
-        (lambda path: path.write_text("hello"), "does not hold moments saved by unconstrain"),
-        (lambda path: path.unlink(), "there is no such file"),
+        (foreign, "holds no moments saved by unconstrain"),
+        (single, "holds no moments saved by unconstrain"),
+        (zipped, "holds no moments saved by unconstrain"),
+        (lambda path: path.write_text("hello"), "holds no moments saved by unconstrain"),
+        (lambda path: path.unlink(), "is not a file, so it holds no moments"),
     ],
 )
 def test_what_is_not_whole_or_not_ours_is_refused(tmp_path, spoil, sentence):

@@ -190,6 +190,22 @@ def test_file_uris_open_as_object_stores_do(tmp_path):
     assert_same_fit(streamed, uc.ParametricPolicy().fit(X, U))
 
 
+@pytest.mark.parametrize("scale", [1e-30, 1.0, 1e18, 1e30])
+def test_single_precision_is_that_of_the_files_and_of_nothing_else(tmp_path, scale):
+    states, actions = (X * scale).astype(np.float32), (U * scale).astype(np.float32)
+    table = {f"x{i}": states[:, i] for i in range(3)} | {f"u{i}": actions[:, i] for i in range(3)}
+    pq.write_table(pa.table(table | {"episode_index": EPISODES}), tmp_path / "a.parquet")
+    centers = CENTERS * scale
+    for make in (
+        lambda: uc.ParametricPolicy(alpha="cv"),
+        lambda: uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=0.7 * scale), alpha="cv"),
+        lambda: uc.LocallyLinearPolicy(centers=centers, width=0.7 * scale, alpha="cv"),
+        lambda: uc.ParametricPolicy(risk="direct", alpha="cv"),
+    ):
+        whole = make().fit(states.astype(float), actions.astype(float), groups=EPISODES)
+        assert_same_fit(stream.fit_stream(make(), tmp_path, **COLUMNS, batch_rows=100), whole, states)
+
+
 def test_columns_not_needed_are_not_read(tmp_path, monkeypatch):
     folder = recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
     asked = []
@@ -331,7 +347,7 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path, other, what):
 
 def test_a_checkpoint_that_is_none_is_refused(tmp_path):
     folder = recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
-    for content, sentence in [(b"hello", "does not hold checkpoint"), (b"PK\x03\x04 cut off", "damaged")]:
+    for content, sentence in [(b"hello", "holds no checkpoint saved by"), (b"PK\x03\x04 cut off", "damaged")]:
         (tmp_path / "run.npz").write_bytes(content)
         with pytest.raises(uc.errors.UnconstrainError, match=sentence):
             stream.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, checkpoint=tmp_path / "run.npz")

@@ -264,7 +264,7 @@ def changed(name, row, value):
     return values
 
 
-LONG = pa.array([[1.0] * (8 if i == 207 else 9) for i in range(len(X))])
+LONG = pa.array([np.eye(3).ravel()[: 8 if i == 207 else 9] for i in range(len(X))])
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,10 @@ LONG = pa.array([[1.0] * (8 if i == 207 else 9) for i in range(len(X))])
         ),
         ("N", LONG, "lists", "part-1.parquet: column 'N' holds a list of 8 at row 7 .* 9 numbers are needed"),
         ("n0", np.full(len(X), "a"), "columns", "part-0.parquet: column 'n0' holds string values"),
+        ("N", pa.array([{"a": 1.0}] * len(X)), "lists", "part-0.parquet: column 'N' holds struct"),
+        ("N", pa.array([[2.0] * 9] * len(X)), "lists", "part-0.parquet: the projection at row 0 .* is none"),
         ("f1", changed("f1", 207, np.nan), "force", "part-1.parquet: column 'f1' holds nan at row 7"),
+        ("free", np.full(len(X), "yes"), "free", "part-0.parquet: column 'free' holds 'yes' at row 0"),
         ("free", changed("free", 207, 2.0), "free", "part-1.parquet: column 'free' holds 2 at row 7"),
     ],
 )
@@ -298,6 +301,7 @@ def test_broken_files_are_named(tmp_path, name, values, way, sentence):
         ("auto", None, {"force": FORCE["force"]}, "give force_threshold, above which"),
         ("auto", None, {"force_threshold": 2.0}, "force_threshold is for forces"),
         ("auto", None, FORCE | {"force_threshold": 0.0}, "force threshold must be a number above zero"),
+        ("auto", None, FORCE | {"force_threshold": "2"}, "force threshold must be a number above zero"),
         ("auto", None, FORCE | {"force": ["f0", "f1"]}, "2 force columns and 3 actions"),
         ("auto", None, FORCE | {"force": ["f0", "f1", "fz"]}, r"no column 'fz' for force"),
         ("auto", None, {"free": "N"}, "lists that are missing|stands for 9"),
@@ -315,6 +319,10 @@ def test_broken_files_are_named(tmp_path, name, values, way, sentence):
         ("auto", [(X, U), (X, U, None, N)], {}, "batch 1 .* has projections but the first has none"),
         ("auto", [(X, U, None, N), (X, U)], {}, "batch 1 .* has no projections but the first has some"),
         ("auto", [(X, U, None, N[:3])], {}, "batch 0 .*: projections must have shape"),
+        ("auto", [(X, U, None, 2 * N)], {}, r"batch 0 .*: the projection of row \d+ is none"),
+        ("auto", [(X, U, None, [["a"]] * len(X))], {}, "batch 0 .*: projections must be an array of numbers"),
+        ("auto", [("abc", U, None, N)], {}, "X of batch 0 must be an array of numbers"),
+        ("auto", [([[1.0, 2.0], [3.0]], U[:2])], {}, "X of batch 0 must be an array of numbers"),
         ("auto", [(X, U, None, N, N)], {}, r"\(X, U\), \(X, U, groups\) or \(X, U, groups, projections\)"),
     ],
 )
@@ -326,6 +334,37 @@ def test_mistakes_are_told_in_one_sentence(tmp_path, risk, source, options, sent
         uc.fit_stream(policy, source, **columns, **options)
     assert "\n" not in str(caught.value)
     assert not hasattr(policy, "moments_")
+
+
+def test_flags_may_be_booleans_or_say_so(tmp_path):
+    free = np.array(TOUCHED["free"]) == 1
+    whole = uc.fit_stream(
+        uc.ParametricPolicy(), spoilt(tmp_path / "ones", "free", free * 1), **COLUMNS, **WAYS["free"]
+    )
+    for name, flags in [("booleans", free), ("text", free.astype(str))]:
+        folder = spoilt(tmp_path / name, "free", flags)
+        policy = uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **WAYS["free"])
+        assert policy.n_known_constraints_ == whole.n_known_constraints_ == np.count_nonzero(free)
+        np.testing.assert_array_equal(policy.predict(X), whole.predict(X))
+        loaded = uc.load(folder / "part-0.parquet", **COLUMNS, free="free")
+        np.testing.assert_array_equal(loaded.free, free[:200])
+
+
+@pytest.mark.parametrize("unknown", [0, 1])
+def test_a_file_may_know_no_projection(tmp_path, unknown):
+    folder = recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, [200], more=TOUCHED)
+    path = folder / f"part-{unknown}.parquet"
+    table = pq.read_table(path)
+    at = table.schema.get_field_index("N")
+    rows = slice(200) if unknown == 0 else slice(200, None)
+    known = N.copy()
+    known[rows] = np.nan
+    whole = uc.fit_stream(uc.ParametricPolicy(), [(X, U, EPISODES, known)])
+    for nothing in (pa.nulls(len(table)), pa.array([[]] * len(table), pa.list_(pa.float64()))):
+        pq.write_table(table.set_column(at, "N", nothing), path)
+        policy = uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **WAYS["lists"])
+        assert policy.n_known_constraints_ == whole.n_known_constraints_
+        np.testing.assert_allclose(policy.predict(X), whole.predict(X), rtol=1e-9)
 
 
 def test_an_episode_that_comes_back_has_no_neighbours(tmp_path):

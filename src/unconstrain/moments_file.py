@@ -91,21 +91,21 @@ def read(
     Raises `UnconstrainError` for a file that is missing, foreign, damaged, or from a newer release.
     """
     if not os.path.isfile(path):
-        raise UnconstrainError(f"{path}: there is no such file of {kinds[0]}")
+        raise UnconstrainError(f"{path} is not a file, so it holds no {kinds[0]}: check the path")
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         about = json.loads(str(arrays.pop(NOTE)))
         kind, found = about["kind"], int(about["format"])
     except (KeyError, AttributeError):  # an archive without our note, or a single array
-        raise UnconstrainError(f"{path} does not hold {kinds[0]} saved by unconstrain") from None
+        raise UnconstrainError(f"{path} holds no {kinds[0]} saved by unconstrain") from None
     except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, TypeError, OSError, NotImplementedError):
         with open(path, "rb") as file:
             ours = file.read(2) == b"PK"
         raise UnconstrainError(
             f"{path} is damaged: write it again"
             if ours
-            else f"{path} does not hold {kinds[0]} saved by unconstrain"
+            else f"{path} holds no {kinds[0]} saved by unconstrain"
         ) from None
     if found > FORMAT:
         raise UnconstrainError(
@@ -113,5 +113,5 @@ def read(
             f"({version('unconstrain')}) reads: upgrade unconstrain"
         )
     if kind not in kinds:
-        raise UnconstrainError(f"{path} does not hold {kinds[0]}: it holds {kind}")
+        raise UnconstrainError(f"{path} holds no {kinds[0]}: it holds {kind}")
     return about, arrays

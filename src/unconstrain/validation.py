@@ -16,6 +16,12 @@ from sklearn.utils.validation import (
 
 from unconstrain.errors import DataError, PolicyError
 
+ROUNDED = 0.05
+NOT_IDEMPOTENT = (
+    "is none, since applied twice it does something else than applied once: give N = I - A⁺A, as "
+    "constraints.projection(A) makes it of the rows A"
+)
+
 
 def check_finite(array: np.ndarray, name: str) -> None:
     """Raise a `DataError` naming the first entry of `array` (samples first) that is NaN or infinite."""
@@ -62,9 +68,19 @@ def check_samples(estimator, X, y, *, reset: bool, min_samples: int = 1) -> tupl
     return X, y
 
 
+def check_numbers(array, name: str) -> np.ndarray:
+    """An array of float64, of any shape. Raises `DataError` for text, and for rows of different lengths."""
+    try:
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(
+            f"{name} must be an array of numbers, all rows of the same length ({' '.join(str(error).split())})"
+        ) from None
+
+
 def check_actions(U, name: str = "actions") -> np.ndarray:
     """Actions as an (N, d) finite float array; (N,) is read as d = 1. Raises `DataError` otherwise."""
-    U = np.asarray(U, dtype=np.float64)
+    U = check_numbers(U, name)
     if U.ndim == 1:
         U = U[:, None]
     if U.ndim != 2:
@@ -78,7 +94,7 @@ def check_projections(projections, n_samples: int, n_actions: int, *, unknown: b
 
     With `unknown`, those that are not known may be NaN, as a whole.
     """
-    N = np.asarray(projections, dtype=np.float64)
+    N = check_numbers(projections, "projections")
     if N.shape != (n_samples, n_actions, n_actions):
         raise DataError(
             f"projections must have shape {(n_samples, n_actions, n_actions)}, one d x d matrix a sample, "
@@ -91,7 +107,21 @@ def check_projections(projections, n_samples: int, n_actions: int, *, unknown: b
             'leave such samples out, or choose risk="auto", which does without'
         )
     check_finite(np.where(np.isnan(flat).all(axis=1, keepdims=True), 0.0, flat), "projections")
+    odd = not_idempotent(N)
+    if len(odd):
+        raise DataError(f"the projection of row {odd[0]} {NOT_IDEMPOTENT}")
     return N
+
+
+def not_idempotent(projections: np.ndarray) -> np.ndarray:
+    """Rows of the matrices N (N, d, d) that are no projections, as `N N v` is not `N v` for a v that favours no axis.
+
+    Generous, so that projections rounded to two decimals pass; those that are NaN pass too.
+    """
+    v = np.cos(np.arange(projections.shape[2]) + 1.0)
+    once = projections @ v
+    twice = np.einsum("nij,nj->ni", projections, once)
+    return np.flatnonzero(np.abs(twice - once).max(axis=1, initial=0.0) > ROUNDED)
 
 
 def check_weights(sample_weight, X: np.ndarray) -> np.ndarray:
@@ -111,6 +141,10 @@ def check_groups(groups, n_samples: int) -> np.ndarray | None:
     if groups.shape != (n_samples,):
         raise DataError(
             f"groups must hold one episode label a sample, {n_samples} in all, got shape {groups.shape}"
+        )
+    if groups.dtype.kind == "f" and np.isnan(groups).any():
+        raise DataError(
+            f"groups contains NaN in row {np.argmax(np.isnan(groups))}: give every sample the label of an episode"
         )
     return groups
 

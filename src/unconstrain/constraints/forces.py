@@ -14,6 +14,8 @@ friction. Hence four steps:
 4. within a contact, and never across its ends, what is left is averaged over the window, which steadies its direction.
 """
 
+from numbers import Real
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
@@ -80,7 +82,7 @@ def _contact(
     each: list[Rows],
 ) -> tuple[Array, Array]:
     """Contact is read off forces F, the direction off `directed`, in each episode by itself."""
-    if not (np.isfinite(threshold) and threshold > 0):
+    if not (isinstance(threshold, Real) and np.isfinite(threshold) and threshold > 0):
         raise DataError(
             f"the force threshold must be a number above zero, in the unit of the forces, got {threshold!r}"
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from unconstrain.errors import DataError
 from unconstrain.readers.blocks import Array, Block, Samples
-from unconstrain.validation import check_actions, check_finite, check_groups, check_projections
+from unconstrain.validation import check_actions, check_finite, check_groups, check_numbers, check_projections
 
 FORMS = "(X, U), (X, U, groups) or (X, U, groups, projections)"
 
@@ -115,7 +115,7 @@ class Batches:
         for i, item in numbered:
             if not isinstance(item, tuple | list) or len(item) not in (2, 3, 4):
                 raise DataError(f"batch {i} (counted from 0) must be {FORMS}")
-            X = np.asarray(item[0], dtype=np.float64)
+            X = check_numbers(item[0], f"X of batch {i}")
             U = check_actions(item[1], f"U of batch {i}")
             if X.ndim != 2 or len(X) != len(U):
                 raise DataError(

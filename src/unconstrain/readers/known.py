@@ -14,6 +14,7 @@ from unconstrain.readers.blocks import Array
 from unconstrain.readers.reading import Reading
 from unconstrain.readers.shards import Field, Piece, Shards
 from unconstrain.risk import unknown
+from unconstrain.validation import NOT_IDEMPOTENT, not_idempotent
 
 
 @dataclass(frozen=True)
@@ -115,14 +116,22 @@ class Known:
             raise DataError(
                 f"{shards.name(piece.file)}: the projection at row {piece.first + at} (counted from 0) is {what}"
             )
-        return N.reshape(-1, self.d, self.d)
+        N = N.reshape(-1, self.d, self.d)
+        odd = not_idempotent(N)
+        if len(odd):
+            place = f"row {piece.first + odd[0]} (counted from 0)"
+            raise DataError(f"{shards.name(piece.file)}: the projection at {place} {NOT_IDEMPOTENT}")
+        return N
 
     def _flags(self, shards: Shards, piece: Piece) -> Array:
-        (flags,) = shards.numbers([piece], self.free, "free")
+        (field,) = self.free
+        table = shards.table(piece, [field.column])
+        key = field.column if field.component is None else f"{field.column}[{field.component}]"
+        flags = table.flags(*table.find("free", key))
         odd = np.flatnonzero((flags != 0) & (flags != 1))
         if len(odd):
             raise DataError(
-                f"{shards.name(piece.file)}: column {self.free[0].column!r} holds {flags[odd[0]]:g} at row "
+                f"{shards.name(piece.file)}: column {field.column!r} holds {flags[odd[0]]:g} at row "
                 f"{piece.first + odd[0]} (counted from 0), but free is 1 (nothing constrains the motion) or 0"
             )
         return flags
@@ -133,8 +142,10 @@ def _matrix_columns(
 ) -> tuple[str, ...]:
     each = [keys] if isinstance(keys, str | int) else list(keys)
     name = each[0] if len(each) == 1 else None
-    if isinstance(name, str) and name in schema.names and pa.types.is_nested(schema.field(name).type):
-        return (name,)  # of what length its lists are, the first row need not tell: it may be empty
+    if isinstance(name, str) and schema.names.count(name) == 1:
+        kind = schema.field(name).type
+        if pa.types.is_nested(kind) or pa.types.is_null(kind):
+            return (name,)  # of what length its lists are, the first row need not tell: it may be empty
     found = fields("projections", each)
     if len(found) != d**2 or any(field.component is not None for field in found):
         raise DataError(

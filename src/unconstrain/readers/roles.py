@@ -70,7 +70,7 @@ def assigned(
                 "there must be one action per state"
             )
     forces = table.matrix("force", at["force"]) if "force" in at else None
-    flags = table.matrix("free", at["free"])[:, 0] if "free" in at else None
+    flags = table.flags(at["free"][0]) if "free" in at else None
     for name, values in (("forces", forces), ("free flags", flags)):
         if values is not None and len(values) != len(states):
             raise DataError(

@@ -178,16 +178,18 @@ class Shards:
         numbers = np.full((len(piece.rows), width), np.nan)
         for i, column in enumerate(columns):
             values = self._column(piece, column)
+            if pa.types.is_null(values.type):  # a file in which none is known
+                continue
             rows = slice(None)
-            if pa.types.is_nested(values.type) and hasattr(values, "flatten"):
-                lengths = pc.fill_null(pc.list_value_length(values), width).to_numpy()
-                if np.any(lengths != width):
-                    at = int(np.argmax(lengths != width))
+            if pa.types.is_nested(values.type) and hasattr(values.type, "value_type"):
+                lengths = pc.fill_null(pc.list_value_length(values), 0).to_numpy()
+                odd = np.flatnonzero((lengths != width) & (lengths != 0))
+                if len(odd):
                     raise DataError(
-                        f"{self.name(piece.file)}: column {column!r} holds a list of {lengths[at]} at "
-                        f"{row(piece.first + at)} where {width} numbers are needed"
+                        f"{self.name(piece.file)}: column {column!r} holds a list of {lengths[odd[0]]} at "
+                        f"{row(piece.first + int(odd[0]))} where {width} numbers are needed"
                     )
-                rows, values = values.is_valid().to_numpy(zero_copy_only=False), values.flatten()
+                rows, values = lengths > 0, values.flatten()
             kind = values.type
             if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)):
                 raise DataError(
@@ -244,8 +246,10 @@ class Shards:
             rows = flat.to_numpy().reshape(-1, width)
             for i, component in places:
                 numbers[i] = rows[:, component]
-        # A sum of squares is finite and small if and only if every number is, and costs next to nothing.
-        return all(float(np.dot(numbers[i], numbers[i])) < 1e300 for i, _ in places)
+        # A sum of squares is finite and small if and only if every number is, and costs next to nothing. Where it
+        # overflows, as it does from 1e19 in single precision, the numbers are looked at one by one.
+        with np.errstate(over="ignore"):
+            return all(float(np.dot(numbers[i], numbers[i])) < 1e300 for i, _ in places)
 
     def _fill_slowly(
         self,

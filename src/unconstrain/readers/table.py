@@ -142,6 +142,18 @@ class Table:
             )
         return array
 
+    def flags(self, position: int) -> NDArray[np.float64]:
+        """One column as `numbers`, of which true and false are 1 and 0, in letters too; see `matrix`."""
+        values = self.filled(position)
+        if pa.types.is_string(values.type) or pa.types.is_large_string(values.type):
+            try:
+                values = values.cast(pa.bool_())
+            except pa.ArrowInvalid:  # numbers, or what the sentence about numbers is for
+                return self.numbers(position)
+        if pa.types.is_boolean(values.type):
+            return values.cast(pa.float64()).to_numpy(zero_copy_only=False)
+        return self.numbers(position)
+
     def filled(self, position: int) -> Any:
         """One column without missing values, as an Arrow array; text is stripped of spaces around it.
 

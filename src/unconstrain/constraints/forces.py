@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from unconstrain.constraints.known import _jacobians, from_normals
+from unconstrain.constraints.known import checked_jacobians, from_normals
 from unconstrain.errors import DataError
 
 Array = NDArray[np.float64]
@@ -146,7 +146,7 @@ def from_forces(
         If shapes do not match, entries are not finite, or a number makes no sense.
     """
     F = _checked(forces)
-    J = None if jacobian is None else _jacobians(jacobian, *F.shape)
+    J = None if jacobian is None else checked_jacobians(jacobian, *F.shape)
     each = _by_episode(episodes, len(F))
     along = None if actions is None else _directions(np.asarray(actions, dtype=np.float64), F, J, each)
     blocking = F if along is None else _across(F, along)

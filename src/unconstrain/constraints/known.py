@@ -41,7 +41,7 @@ def from_normals(normals: ArrayLike, jacobian: ArrayLike | None = None) -> Array
     unknown = np.asarray(np.isnan(n).any(axis=(1, 2)))
     rows = np.where(unknown[:, None, None], 0.0, n)
     if jacobian is not None:
-        rows = rows @ _jacobians(jacobian, len(n), n.shape[2])
+        rows = rows @ checked_jacobians(jacobian, len(n), n.shape[2])
     N = projection(rows)
     N[unknown] = np.nan
     return N
@@ -102,7 +102,8 @@ def first_known(*projections: ArrayLike) -> Array:
     return chosen
 
 
-def _jacobians(jacobian: ArrayLike, samples: int, m: int) -> Array:
+def checked_jacobians(jacobian: ArrayLike, samples: int, m: int) -> Array:
+    """Jacobians as an (N, m, d) finite array, for N samples of m components. Raises `DataError` otherwise."""
     J = _numbers("the Jacobian", jacobian)
     if J.ndim != 3 or J.shape[:2] != (samples, m):
         raise DataError(

@@ -14,11 +14,12 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.readers import lerobot, saved
 from unconstrain.readers.blocks import Array, Block, Samples
+from unconstrain.readers.files import Paths
 from unconstrain.readers.known import Known
 from unconstrain.readers.loading import NothingLeft, derived
 from unconstrain.readers.reading import Reading
 from unconstrain.readers.roles import DIFFERENTIATE, Roles
-from unconstrain.readers.shards import Field, Paths, Piece, Shards
+from unconstrain.readers.shards import Field, Piece, Shards
 from unconstrain.readers.stamps import seconds
 from unconstrain.readers.table import Column, Table
 from unconstrain.selection import EpisodeFolds

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import PurePosixPath
@@ -16,18 +16,16 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
-from unconstrain.readers.files import recordings
+from unconstrain.readers.files import Paths, recordings
 from unconstrain.readers.parquet import columns_of
 from unconstrain.readers.table import Table, row
 
 Array = NDArray[np.float64]
-Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 
 SUFFIXES = (".parquet", ".pq")
 DECODED = 65536  # rows decoded at a time: what a processor's cache holds of a few columns
-SAMPLED_GROUPS = (
-    16  # row groups, at least, that a sample is drawn from: neighbouring rows resemble each other
-)
+SAMPLED_GROUPS = 16
+"""Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
 
 
 class Piece(NamedTuple):
@@ -165,8 +163,7 @@ class Shards:
                     "episodes apart; choose another column"
                 )
             if values.null_count or pa.types.is_floating(values.type):
-                table = self.table(piece, [column])
-                table.labels(0)
+                self.table(piece, [column]).labels(0)  # says which row is empty or NaN
             parts.append(values.to_numpy(zero_copy_only=False))
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 

@@ -255,6 +255,19 @@ def test_progress_tells_rows_done_and_in_all(tmp_path, capsys):
     assert f"{len(X):,} of {len(X):,} rows" in capsys.readouterr().err
 
 
+def test_a_checkpoint_that_cannot_be_written_is_refused_before_the_work(tmp_path):
+    told = []
+    with pytest.raises(uc.errors.UnconstrainError, match="there is no folder"):
+        stream.fit_stream(
+            uc.ParametricPolicy(),
+            [(X, U)],
+            checkpoint=tmp_path / "no" / "c.npz",
+            progress=lambda *rows: told.append(rows),
+        )
+    assert not told
+    assert not list(tmp_path.iterdir())
+
+
 def test_ctrl_c_keeps_what_was_done_and_says_how_to_go_on(tmp_path):
     folder = recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, [100, 333])
     whole = stream.fit_stream(policies()[2], folder, **COLUMNS, batch_rows=64)

@@ -51,5 +51,15 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise
 
 
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raise what `replacing` would raise of this path, before the work whose result is to be written there."""
+    with suppress(_OnlyAsked), replacing(path):
+        raise _OnlyAsked
+
+
+class _OnlyAsked(Exception):
+    """Leaves what is there as it was."""
+
+
 def _reason(error: OSError) -> str:
     return os.strerror(error.errno).lower() if error.errno else str(error)

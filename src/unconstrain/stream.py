@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from unconstrain import atomic
 from unconstrain import checkpoint as checkpoints
 from unconstrain import risk as risks
 from unconstrain.checkpoint import Progress
@@ -134,6 +135,7 @@ def fit_stream(
     if checkpoint is not None:
         belongs_to = checkpoints.identity(work, opened.identity(), settings)
         resumed = checkpoints.load(checkpoint, belongs_to, policy)
+        atomic.check_writable(checkpoint)
     if resumed is None:
         longest = begin(work, opened, sample_rows, random_state, partial=partial)
         resumed = Progress(work, Tally(), 0, longest)

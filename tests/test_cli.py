@@ -124,6 +124,7 @@ def test_states_alone_are_differentiated(run, movements):
         (["fit", "DATA", *COLUMNS, "--figure", "f.docx"], "f.docx"),
         (["fit", "DATA", *COLUMNS, "--centers", "here"], "centers must be one of"),
         (["fit", "DATA", *COLUMNS, "--time", "t,x1"], "--time takes one column"),
+        (["fit", "DATA", "--state", '"x1, in m",x2', "--action", "u1,u2"], "no column 'x1, in m' for state"),
         (["evaluate", "nowhere.skops", "DATA"], "no such policy file"),
         (["evaluate", "DATA", "DATA"], "not a policy saved by unconstrain"),
         (["evaluate", "POLICY", "DATA", "--state", "x1", "--action", "u1"], "maps 2 states to 2 actions"),

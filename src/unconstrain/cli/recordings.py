@@ -1,5 +1,7 @@
 """Which recordings, which of their columns, and what is held out of them: shared by the commands that read files."""
 
+import csv
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,7 +26,9 @@ Files = Annotated[
 State = Annotated[
     str | None,
     typer.Option(
-        "--state", help="State columns: names or positions (from 0), separated by commas.", metavar="x,y,z"
+        "--state",
+        help="State columns: names or positions (from 0), separated by commas; '\"x, in m\"' where a name has some.",
+        metavar="x,y,z",
     ),
 ]
 Action = Annotated[
@@ -82,11 +86,14 @@ PLAIN = ("time_unit", "window", "gap", "max_speed", "min_speed", "min_duration")
 
 
 def columns(text: str | None) -> list[str | int] | None:
-    """`"x,y"` as names, `"1,2"` as positions. Raises `DataError` for an empty name."""
+    """`"x,y"` as names, `"1,2"` as positions; a name in double quotes may hold commas.
+
+    Raises `DataError` for an empty name.
+    """
     if text is None:
         return None
-    names = [name.strip() for name in text.split(",")]
-    if not all(names):
+    names = [name.strip() for row in csv.reader([text], skipinitialspace=True) for name in row]
+    if not names or not all(names):
         raise DataError(f"{text!r} has an empty column name: separate names or positions by single commas")
     return [int(name) if name.isdigit() else name for name in names]
 
@@ -169,3 +176,7 @@ def check_writable(*paths: Path | None) -> None:
             raise DataError(f"cannot write {path}: it is a folder, so give the name of a file")
         if not path.parent.is_dir():
             raise DataError(f"cannot write {path}: there is no folder {path.parent}, so make it first")
+        if not os.access(path.parent, os.W_OK):
+            raise DataError(
+                f"cannot write {path}: nothing may be written to {path.parent}, so choose another folder"
+            )

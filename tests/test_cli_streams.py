@@ -1,4 +1,5 @@
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import recordings
@@ -59,6 +60,26 @@ def test_a_cluster_of_this_machine(run, folder):  # noqa: F811
     assert_same_fit(
         uc.load_policy("policy.skops"), uc.ParametricPolicy(alpha="cv").fit(X, U, groups=EPISODES)
     )
+
+
+def test_a_worker_that_cannot_read_says_so_in_one_sentence(run, touched):  # noqa: F811
+    pytest.importorskip("distributed")
+    options = ("--force", "f0,f1,f2", "--force-threshold", "0", "--cluster", "local")
+    code, _, err = run("fit", touched, *COLUMNS, *options)
+    assert code == 2
+    assert "error: the force threshold must be a number above zero" in err
+    assert "Traceback" not in err
+
+
+def test_names_that_hold_commas_are_quoted(run, tmp_path):  # noqa: F811
+    table = pq.read_table(recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, []) / "part-0.parquet")
+    names = ["größe, in m" if name == "x0" else name for name in table.column_names]
+    pq.write_table(table.rename_columns(names), tmp_path / "named.parquet")
+    code, out, err = run(
+        "fit", "named.parquet", "--state", '"größe, in m", x1,x2', *COLUMNS[2:], "--model", "linear"
+    )
+    assert code == 0, err
+    assert "states größe, in m, x1, x2" in out
 
 
 @pytest.mark.parametrize("where", [(), ("--checkpoint", "run.npz"), ("--cluster", "local")])

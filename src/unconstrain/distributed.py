@@ -6,6 +6,7 @@ episode belongs to is decided before, by a pass over the episode column alone, s
 it in.
 """
 
+import logging
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -120,7 +121,7 @@ def connected(cluster: str, timeout: float = 10.0) -> Iterator[Any]:
     """A client of the scheduler at an address such as `tcp://host:8786`, or of a cluster of this machine, "local".
 
     timeout: seconds in which the scheduler must answer.
-    Raises `UnconstrainError` where Dask is not installed, or no scheduler answers.
+    Raises `UnconstrainError` where Dask is not installed, no scheduler answers, or no workers can be started.
     """
     try:
         import distributed
@@ -129,10 +130,16 @@ def connected(cluster: str, timeout: float = 10.0) -> Iterator[Any]:
             "a cluster needs Dask, which is not installed: pip install 'unconstrain[distributed]'"
         ) from error
     if cluster == "local":
-        with (
-            distributed.LocalCluster(threads_per_worker=1, dashboard_address=None) as local,
-            distributed.Client(local) as client,
-        ):
+        try:  # what goes wrong with a part is raised here, so workers need not log it as well
+            local = distributed.LocalCluster(
+                threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+            )
+        except RuntimeError as error:
+            raise UnconstrainError(
+                "no worker processes could be started on this machine: in a script, call this below "
+                'if __name__ == "__main__":, as each of them imports the script'
+            ) from error
+        with local, distributed.Client(local) as client:
             yield client
         return
     try:

@@ -258,6 +258,10 @@ POLICY = uc.ParametricPolicy().fit(X, X)
         (lambda: uc.identifiability(POLICY, X, X).contributions(), "needs to know them"),
         (lambda: uc.identifiability(POLICY, X, X).next_recordings(0), "a whole number of at least 1"),
         (
+            lambda: uc.identifiability(POLICY, X, X).gains(X, np.eye(2)),
+            "20 states, so directions must have shape",
+        ),
+        (
             lambda: uc.identifiability(POLICY, X, X).next_recordings(1, criterion="E"),
             "criterion must be one of",
         ),

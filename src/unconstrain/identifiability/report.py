@@ -240,9 +240,14 @@ class Identifiability:
 
         X (C, n): where each begins; directions (C, d): along which it moves. Returns (C,).
         """
-        q = check_actions(directions, "directions")
+        X, q = check_states(self.policy, X), check_actions(directions, "directions")
+        if q.shape != (len(X), self.policy.n_actions_):
+            raise DataError(
+                f"there are {len(X)} states, so directions must have shape {(len(X), self.policy.n_actions_)}, one for "
+                f"each, got {q.shape}"
+            )
         planner = self.planner(candidates, length)
-        return planner.gains(check_states(self.policy, X), risks.directions(q)[0]) / len(planner.X)
+        return planner.gains(X, risks.directions(q)[0]) / len(planner.X)
 
     def planner(self, candidates=None, length=None) -> Planner:
         """For recordings chosen one after the other by other rules than `next_recordings`."""

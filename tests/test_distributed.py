@@ -19,7 +19,7 @@ dask = pytest.importorskip("distributed")
 @pytest.fixture(scope="module")
 def cluster():
     """Two worker processes."""
-    with dask.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with dask.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
         yield cluster
 
 

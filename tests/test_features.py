@@ -15,7 +15,7 @@ from sklearn.utils.estimator_checks import (
 
 import unconstrain as uc
 from unconstrain import accumulation
-from unconstrain import risk as risks
+from unconstrain.sight import sight
 
 SQUARE = [
     uc.DecoupledFeatures(),
@@ -87,7 +87,7 @@ def test_moments_are_those_of_the_rows(features, risk):
     rng = np.random.default_rng(0)
     X, U = rng.normal(size=(2, 50, 3))
     N = uc.constraints.projection(rng.normal(size=(50, 1, 3))) if risk == "constrained" else None
-    fitted, seen, weights = clone(features).fit(X, 3), risks.sight(risk, U, N), rng.random(50)
+    fitted, seen, weights = clone(features).fit(X, 3), sight(risk, U, N), rng.random(50)
     moments = accumulation.parametric_moments(fitted, X, seen, weights)
     columns = [fitted.evaluate(X, w) for w in np.eye(fitted.n_parameters_)]  # Φ(x), one parameter at a time
     V = np.einsum("nkd,ndp->nkp", seen.rows, np.stack(columns, axis=2))

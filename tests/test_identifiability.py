@@ -13,6 +13,7 @@ from unconstrain.cli.app import app
 from unconstrain.identifiability.information import of_recordings
 from unconstrain.identifiability.spectrum import directions
 from unconstrain.plants import arm, toy
+from unconstrain.sight import moving
 from unconstrain.uncertainty import Unsure
 
 
@@ -105,7 +106,7 @@ def test_bounds_hold_for_policies_in_the_span(seed, d, off):
                     policy, name, getattr(policy, name) + off * rng.normal(size=getattr(policy, name).shape)
                 )
         report = uc.identifiability(policy, X, U)
-        counted = uc.risk.moving(U)
+        counted = moving(U)
         error = uc.risk.unconstrained_policy_error(Pi[counted], policy.predict(X)[counted])
         assert error <= report.bound * (1 + 1e-6) + 1e-12
     policy = uc.ParametricPolicy().fit(X, U)

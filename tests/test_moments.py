@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 from sklearn.preprocessing import PolynomialFeatures
 
 from problems import problems
-from unconstrain import risk
 from unconstrain.accumulation import local_moments, parametric_moments
 from unconstrain.features import FullFeatures
 from unconstrain.moments import Moments
+from unconstrain.sight import RISKS, sight
 
 
 class Rows:
@@ -37,7 +37,7 @@ def dense(features, X, seen, weights):
 def test_moments_are_the_sums_they_are_defined_as(problem, name):
     X, _, N, U, rng = problem
     features = FullFeatures(PolynomialFeatures(2)).fit(X, U.shape[1])
-    seen, weights = risk.sight(name, U, N), rng.random(len(X))
+    seen, weights = sight(name, U, N), rng.random(len(X))
     H, g, s = dense(features, X, seen, weights)
     for way in (features, Rows(features)):
         moments = parametric_moments(way, X, seen, weights)
@@ -48,12 +48,12 @@ def test_moments_are_the_sums_they_are_defined_as(problem, name):
 
 
 @settings(deadline=None)
-@given(problems(), st.sampled_from(risk.RISKS))
+@given(problems(), st.sampled_from(RISKS))
 def test_local_moments_are_parametric_moments_weighted(problem, name):
     X, _, N, U, rng = problem
     linear = FullFeatures().fit(X, U.shape[1])
     centers, width = X[rng.integers(len(X), size=3)], float(np.std(X))
-    seen, weights = risk.sight(name, U, N), rng.random(len(X))
+    seen, weights = sight(name, U, N), rng.random(len(X))
     local = local_moments(centers, width, X, seen, weights)
     for m, center in enumerate(centers):
         receptive = np.exp(-np.sum((X - center) ** 2, axis=1) / (2 * width**2))
@@ -67,7 +67,7 @@ def test_models_far_from_a_block_are_left_out_of_it_and_nothing_changes():
     rng = np.random.default_rng(0)
     X = np.linspace(0, 200, 3000)[:, None] + rng.normal(size=(3000, 2))  # one long movement
     U, centers = rng.normal(size=(3000, 2)), X[::100].copy()
-    seen = risk.sight("inconsistency", U)
+    seen = sight("inconsistency", U)
     local = local_moments(centers, 1.0, X, seen)
     V = seen.rows[:, 0, :, None] * np.column_stack([X, np.ones(3000)])[:, None]
     V = V.reshape(3000, -1)
@@ -78,11 +78,11 @@ def test_models_far_from_a_block_are_left_out_of_it_and_nothing_changes():
 
 
 @settings(deadline=None)
-@given(problems(min_samples=4), st.sampled_from(risk.RISKS), st.floats(0.1, 0.9))
+@given(problems(min_samples=4), st.sampled_from(RISKS), st.floats(0.1, 0.9))
 def test_moments_of_two_parts_add_to_those_of_the_whole(problem, name, share):
     X, _, N, U, rng = problem
     features = FullFeatures().fit(X, U.shape[1])
-    seen, weights = risk.sight(name, U, N), rng.random(len(X))
+    seen, weights = sight(name, U, N), rng.random(len(X))
     cut = max(1, int(share * len(X)))
     parts = [parametric_moments(features, X[s], seen[s], weights[s]) for s in (slice(cut), slice(cut, None))]
     whole = parametric_moments(features, X, seen, weights)
@@ -93,11 +93,11 @@ def test_moments_of_two_parts_add_to_those_of_the_whole(problem, name, share):
 
 
 @settings(deadline=None)
-@given(problems(), st.sampled_from(risk.RISKS))
+@given(problems(), st.sampled_from(RISKS))
 def test_risk_from_moments_is_the_risk_on_the_samples(problem, name):
     X, _, N, U, rng = problem
     features = FullFeatures(PolynomialFeatures(2)).fit(X, U.shape[1])
-    seen, weights = risk.sight(name, U, N), rng.random(len(X))
+    seen, weights = sight(name, U, N), rng.random(len(X))
     moments = parametric_moments(features, X, seen, weights)
     w = rng.normal(size=(moments.H.shape[0], 3, moments.g.shape[1]))
     for candidate in range(3):

@@ -201,6 +201,8 @@ def test_single_precision_is_that_of_the_files_and_of_nothing_else(tmp_path, sca
         lambda: uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=0.7 * scale), alpha="cv"),
         lambda: uc.LocallyLinearPolicy(centers=centers, width=0.7 * scale, alpha="cv"),
         lambda: uc.ParametricPolicy(risk="direct", alpha="cv"),
+        lambda: uc.LocallyLinearPolicy(centers=centers, width=0.7 * scale, risk="direct", alpha="cv"),
+        lambda: uc.ParametricPolicy(uc.DecoupledFeatures(), risk="direct", alpha="cv"),
     ):
         whole = make().fit(states.astype(float), actions.astype(float), groups=EPISODES)
         assert_same_fit(stream.fit_stream(make(), tmp_path, **COLUMNS, batch_rows=100), whole, states)

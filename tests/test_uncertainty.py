@@ -10,6 +10,7 @@ from sklearn.preprocessing import PolynomialFeatures
 import unconstrain as uc
 from problems import problems
 from unconstrain.plants import toy
+from unconstrain.sight import directions
 from unconstrain.uncertainty import Posterior
 
 NINETY = 1.6448536269514722
@@ -19,7 +20,7 @@ def linear_problem(seed, samples=400, noise=0.1):
     """A linear policy seen along random directions, with noise along them: the model holds all of the truth."""
     rng = np.random.default_rng(seed)
     X, W = rng.normal(size=(samples, 3)), rng.normal(size=(3, 3))
-    unit = uc.risk.directions(rng.normal(size=(samples, 3)))[0]
+    unit = directions(rng.normal(size=(samples, 3)))[0]
     along = np.einsum("nd,nd->n", unit, X @ W) + noise * rng.normal(size=samples)
     return X, along[:, None] * unit, W, rng
 
@@ -28,7 +29,7 @@ def test_the_evidence_is_the_likelihood_of_the_data():
     X, U, _, _ = linear_problem(0, samples=30)
     policy = uc.ParametricPolicy().fit(X, U)
     posterior = policy.posterior()
-    unit, r = uc.risk.directions(U)
+    unit, r = directions(U)
     V = policy.features_.along(X, unit)
     noise, decay = float(posterior.noise), float(posterior.decay)
     covariance = noise * (np.eye(len(r)) + V @ V.T / decay)

@@ -17,7 +17,7 @@ from unconstrain.features import FullFeatures, PolicyFeatures
 from unconstrain.features.centers import activations
 from unconstrain.moments import Moments
 from unconstrain.parallel import blocks, shared_out
-from unconstrain.risk import Sight
+from unconstrain.sight import Sight
 
 # Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
 # in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.
@@ -25,8 +25,9 @@ PRODUCTS_IN_BLOCK = 2**18
 LOCAL_PRODUCTS_IN_BLOCK = 2**19
 ROWS_IN_BLOCK = 2**21
 
-NARROW = 2**12  # entries of a product that is too small to be worth its packing
-PIECE = 384
+# A product of at most so many entries is narrow: it is taken in pieces of so many samples (see `_narrow`).
+NARROW = 2**12
+SAMPLES_IN_PIECE = 384
 
 # Beyond twelve σ: so little, squared rounding, that no number of samples makes it show. Farther out weights are
 # subnormal numbers as well, with which processors multiply at a tenth of their speed.
@@ -61,6 +62,9 @@ def local_moments(
     M, n, d = len(centers), X.shape[1], seen.n_actions
     pairs_b, pairs_q = _pairs(n + 1), (1 if seen.whole else _pairs(d))
     n_products, n_pulls = pairs_b * pairs_q, d * (n + 1)
+    # All that is summed, a row each: the distinct entries of H, then g, s and the weight itself.
+    n_summed = n_products + n_pulls + 2
+    size = _rows(LOCAL_PRODUCTS_IN_BLOCK, n_summed)
 
     def add(block: slice, totals: Totals) -> None:
         B, part = _with_one(X[block]), seen[block]
@@ -69,7 +73,6 @@ def local_moments(
         near = receptive.max(axis=0) > NEGLIGIBLE
         if weights is not None:
             receptive *= weights[block, None]
-        # All that is summed, a row each: the distinct entries of H, then g, s and the weight itself.
         (total,) = totals
         summed = _space("summed", n_summed, size)[:, : len(B)]
         products = summed[:n_products].reshape(pairs_b, pairs_q, -1)
@@ -86,8 +89,6 @@ def local_moments(
         else:  # samples in a row are near each other, and in a large workspace far from most models
             total[near] += receptive[:, near].T @ summed.T
 
-    n_summed = n_products + n_pulls + 2
-    size = _rows(LOCAL_PRODUCTS_IN_BLOCK, n_summed)
     (total,) = _sum_over_blocks(len(X), size, [(M, n_summed)], add)
     H, g = total[:, :n_products], total[:, n_products:-2]
     squares, weight = total[:, -2].copy(), total[:, -1].copy()
@@ -122,6 +123,7 @@ def _product_moments(
     features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None
 ) -> Moments:
     M, d = features.n_basis_, seen.n_actions
+    size = _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d))
 
     def add(block: slice, totals: Totals) -> None:
         B, part, omega = features.basis(X[block]), seen[block], None if weights is None else weights[block]
@@ -133,7 +135,6 @@ def _product_moments(
         totals[1] += (pull if omega is None else pull * omega) @ B
         totals[2] += squares.sum() if omega is None else squares @ omega
 
-    size = _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d))
     shapes = [(_pairs(M), _pairs(d)), (d, M), ()]
     products, g, squares = _sum_over_blocks(len(X), size, shapes, add)
     return Moments(_unfold(products, M, d), g.reshape(-1, 1), squares, _weight(weights, X), len(X))
@@ -146,11 +147,11 @@ def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     goes twice as fast while a piece fits the innermost cache.
     """
     (a, N), b = A.shape, len(B)
-    pieces = N // PIECE if a * b <= NARROW else 0
+    pieces = N // SAMPLES_IN_PIECE if a * b <= NARROW else 0
     if pieces < 2:
         return A @ B.T
-    cut = pieces * PIECE
-    parts = (rows[:, :cut].reshape(len(rows), pieces, PIECE).swapaxes(0, 1) for rows in (A, B))
+    cut = pieces * SAMPLES_IN_PIECE
+    parts = (rows[:, :cut].reshape(len(rows), pieces, SAMPLES_IN_PIECE).swapaxes(0, 1) for rows in (A, B))
     left, right = parts
     return np.matmul(left, right.swapaxes(1, 2)).sum(axis=0) + A[:, cut:] @ B[:, cut:].T
 
@@ -160,7 +161,7 @@ def _whole_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: 
     M, d = features.n_basis_, seen.n_actions
 
     def add(block: slice, totals: Totals) -> None:
-        B, targets = features.basis(X[block]), seen.targets[block].astype(np.float64, copy=False)
+        B, targets = features.basis(X[block]), seen.targets[block]
         if weights is not None:
             root = np.sqrt(weights[block, None])
             B, targets = B * root, targets * root

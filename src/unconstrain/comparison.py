@@ -22,11 +22,13 @@ import numpy as np
 from sklearn.base import clone
 from sklearn.preprocessing import SplineTransformer
 
-from unconstrain import risk, selection
+from unconstrain import selection
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.sight import errors as squared_errors
+from unconstrain.sight import sight
 from unconstrain.validation import check_actions, check_groups, check_number, check_projections, check_samples
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
@@ -224,8 +226,8 @@ def _judge(name: str, policy: Policy, X, U, groups, projections) -> tuple[Row, P
         taken = projections if policy.risk in ("auto", "constrained") else None
         fitted, predictions, fold = _hold_out(policy, X, U, groups, taken)
         actions = check_actions(U)
-        seen = risk.sight("auto", actions, projections)
-        errors = np.sum((seen.targets - np.einsum("nkd,nd->nk", seen.rows, predictions)) ** 2, axis=1)
+        seen = sight("auto", actions, projections)
+        errors = squared_errors(seen, predictions)
         means = np.array([errors[fold == k].mean() for k in np.unique(fold)])
         row = Row(
             name,

@@ -132,7 +132,7 @@ def connected(cluster: str, timeout: float = 10.0) -> Iterator[Any]:
     if cluster == "local":
         try:  # what goes wrong with a part is raised here, so workers need not log it as well
             local = distributed.LocalCluster(
-                threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+                threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
             )
         except RuntimeError as error:
             raise UnconstrainError(

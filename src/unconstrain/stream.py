@@ -21,7 +21,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from unconstrain import atomic
 from unconstrain import checkpoint as checkpoints
-from unconstrain import risk as risks
 from unconstrain.checkpoint import Progress
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.policies.base import NO_DIRECTION, Policy
@@ -33,6 +32,7 @@ from unconstrain.readers.blocks import Block, Samples, Source
 from unconstrain.readers.reading import Reading
 from unconstrain.readers.roles import Keys
 from unconstrain.readers.table import Key
+from unconstrain.sight import moving
 from unconstrain.validation import check_samples
 
 BATCH_ROWS = 2**16
@@ -217,7 +217,7 @@ def begin(
                 f"actions have {U.shape[1]} dimensions, but this policy has learnt {work.n_actions_}"
             )
         return max(work.longest_action_, float(lengths.max(initial=0.0)))
-    moves = risks.moving(U)
+    moves = moving(U)
     states = X[moves] if moves.any() and work.risk not in ("direct", "constrained") else X
     work._begin(states, U.shape[1], np.ones(len(states)), scalars=source.scalar_actions)
     return float(lengths.max(initial=0.0))

@@ -17,7 +17,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.identifiability import identifiability
 from unconstrain.policies.base import Policy
-from unconstrain.risk import unknown
+from unconstrain.sight import unknown
 from unconstrain.validation import check_choice
 
 WORTH_A_WARNING = 0.1

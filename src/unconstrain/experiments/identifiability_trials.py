@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from unconstrain import risk
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.experiments import arm_trials
 from unconstrain.experiments import toy as toy_experiment
@@ -17,6 +16,7 @@ from unconstrain.plants import arm, toy
 from unconstrain.plants.task import TaskConstraint
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.sight import directions
 
 POWERS = (1.5, 1.8)
 BEST_FIRST = ("2-4-6", "1-3-5", "4-5-6", "1-2-3")
@@ -116,7 +116,7 @@ def _calibration(seed: int) -> dict[str, dict[str, float]]:
 
 
 def _along(demos: Demonstrations) -> np.ndarray:
-    return risk.directions(demos.actions)[0]
+    return directions(demos.actions)[0]
 
 
 def _toy_advised(seed: int, way: str) -> list[float]:
@@ -141,7 +141,7 @@ def _toy_advised(seed: int, way: str) -> list[float]:
 
 
 def _toy_drawn(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    return rng.uniform(-1.0, 1.0, size=2), risk.directions(rng.normal(size=(1, 2)))[0][0]
+    return rng.uniform(-1.0, 1.0, size=2), directions(rng.normal(size=(1, 2)))[0][0]
 
 
 def _free_along(x: np.ndarray, direction: np.ndarray, length: int = 40, rate: float = 50.0) -> Demonstrations:
@@ -209,7 +209,7 @@ def _foreseen(policy, pool: np.ndarray, constraint, length: int = 100) -> tuple[
         u = np.einsum("cij,cj->ci", N, policy.predict(x))
         if k % (length // PATH_POINTS) == 0:
             states.append(x)
-            along.append(risk.directions(u)[0])
+            along.append(directions(u)[0])
         x = np.clip(x + u, -arm.LIMITS, arm.LIMITS)
     return np.stack(states, axis=1), np.stack(along, axis=1)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from unconstrain.identifiability.information import seen_along, weights_of_models
 from unconstrain.policies.base import Policy
-from unconstrain.risk import sight
+from unconstrain.sight import sight
 from unconstrain.uncertainty import Posterior
 
 CRITERIA = ("A", "D")

@@ -13,7 +13,7 @@ import numpy as np
 from unconstrain.accumulation import distinct_products
 from unconstrain.features.centers import normalized_activations
 from unconstrain.parallel import blocks
-from unconstrain.risk import directions
+from unconstrain.sight import directions
 
 NUMBERS_IN_BLOCK = 2**22
 

@@ -15,7 +15,7 @@ from unconstrain.identifiability.spectrum import directions, shares_seen
 from unconstrain.moments import Moments
 from unconstrain.parallel import blocks
 from unconstrain.policies.base import Policy
-from unconstrain.risk import Sight
+from unconstrain.sight import Sight
 
 NUMBERS_IN_BLOCK = 2**20
 

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unconstrain import risk as risks
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features import FullFeatures, NormalizedRBF
 from unconstrain.features.centers import activations
 from unconstrain.moments import Moments
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.sight import informative, moving, sight
 from unconstrain.validation import check_actions, check_projections, check_states, check_weights
 
 
@@ -61,19 +61,19 @@ def of_recordings(
             f"{policy.n_actions_} actions: give one row of them for each state"
         )
     weights = check_weights(sample_weight, X)
-    counted = risks.moving(U)
+    counted = moving(U)
     if projections is not None:
         projections = check_projections(projections, *U.shape, unknown=True)
-        counted |= risks.informative(projections)
+        counted |= informative(projections)
     counted &= weights > 0
     if not counted.any():
         raise DataError("nothing moves in these recordings, so they say nothing about a policy")
     X, U, weights = X[counted], U[counted], weights[counted]
-    seen = risks.sight("auto", U, None if projections is None else projections[counted])
+    seen = sight("auto", U, None if projections is None else projections[counted])
     moments = stacked(policy._moments(X, seen, weights))
     if projections is None and shares_blocks(policy):
         return Information(moments, _traced(moments.H, policy.n_actions_)), counted
-    return Information(moments, stacked(policy._moments(X, risks.sight("direct", U), weights)).H), counted
+    return Information(moments, stacked(policy._moments(X, sight("direct", U), weights)).H), counted
 
 
 def of_fit(policy: Policy) -> Information:

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain import risk as risks
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import activations, farthest_first
 from unconstrain.identifiability import bound as bounding
@@ -21,6 +20,8 @@ from unconstrain.identifiability.words import described
 from unconstrain.moments import Moments
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.sight import directions as units
+from unconstrain.sight import sight
 from unconstrain.uncertainty import Posterior
 from unconstrain.validation import (
     check_actions,
@@ -247,7 +248,7 @@ class Identifiability:
                 f"each, got {q.shape}"
             )
         planner = self.planner(candidates, length)
-        return planner.gains(X, risks.directions(q)[0]) / len(planner.X)
+        return planner.gains(X, units(q)[0]) / len(planner.X)
 
     def planner(self, candidates=None, length=None) -> Planner:
         """For recordings chosen one after the other by other rules than `next_recordings`."""
@@ -266,7 +267,7 @@ class Identifiability:
             raise DataError(
                 "which episodes contribute needs to know them: identifiability(policy, X, U, groups=...)"
             )
-        seen = risks.sight("auto", near.U, near.projections)
+        seen = sight("auto", near.U, near.projections)
         args = (self.policy, self.information, near.X, seen, near.weights, near.episodes)
         return contributions(*args, self.threshold)
 

@@ -9,13 +9,13 @@ import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain import risk as risks
 from unconstrain import selection
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.moments import Moments
 from unconstrain.policies import compilation, onnx, persistence
 from unconstrain.policies.compiled import CompiledPolicy
 from unconstrain.policies.tally import Tally
+from unconstrain.sight import NO_MOTION, RISKS, Sight, informative, lengths, moving, sight, unknown
 from unconstrain.uncertainty import Posterior
 from unconstrain.validation import (
     check_actions,
@@ -99,7 +99,11 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return actions, spread
 
     def posterior(self) -> Posterior:
-        """What the samples say of the parameters and of their own noise: see `uncertainty`. Costs a decomposition."""
+        """What the samples say of the parameters and of their own noise: see `uncertainty`. Costs a decomposition.
+
+        Each sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
+        more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
+        """
         check_is_fitted(self)
         seen = Moments.sum([fold for fold in self.moments_ if fold is not None])
         return Posterior.of(seen, self.n_actions_ if self.risk == "direct" else 1)
@@ -164,7 +168,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return True
 
     @abstractmethod
-    def _moments(self, X: np.ndarray, seen: risks.Sight, weights: np.ndarray | None = None) -> Moments:
+    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None) -> Moments:
         """The samples, added up, whatever precision they come in."""
 
     @abstractmethod
@@ -195,7 +199,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             )
         longest = max(np.linalg.norm(U, axis=1).max(), 0.0 if first else self.longest_action_)
         if first:
-            counted = self._counted(risks.moving(U, longest), weights, N)
+            counted = self._counted(moving(U, longest), weights, N)
             if not counted.any():
                 raise DataError(NO_DIRECTION)
             self._begin(X[counted], U.shape[1], weights[counted], scalars=np.ndim(y) == 1)
@@ -205,7 +209,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         return self
 
     def _check_options(self) -> None:
-        check_choice(self.risk, "risk", risks.RISKS)
+        check_choice(self.risk, "risk", RISKS)
         if isinstance(self.alpha, str):
             check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
         else:
@@ -235,11 +239,11 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
 
         `longest`: the longest action known so far, if that is not among these.
         """
-        lengths = risks.lengths(U)
-        longest = max(float(lengths.max(initial=0.0)), longest)
-        moves = lengths > risks.NO_MOTION * longest
+        r = lengths(U)
+        longest = max(float(r.max(initial=0.0)), longest)
+        moves = r > NO_MOTION * longest
         counted = self._counted(moves, weights, projections)
-        seen = risks.sight(self.risk, U, projections)
+        seen = sight(self.risk, U, projections, np.where(moves, r, 0.0))
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
         for k in [0] if fold is None else np.unique(fold[counted]):
             rows = counted if fold is None else counted & (fold == k)
@@ -254,11 +258,11 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
                 moments[k] = self._moments(X.T.take(index, axis=1).T, seen[index], taken)
         return Tally(
             tuple(moments),
-            len(U),
-            len(U) - int(np.count_nonzero(moves)),
-            longest,
-            float(lengths.min(initial=math.inf, where=moves)),
-            0 if projections is None else int(np.count_nonzero(~risks.unknown(projections))),
+            n_samples=len(U),
+            n_zero=len(U) - int(np.count_nonzero(moves)),
+            longest=longest,
+            shortest=float(r.min(initial=math.inf, where=moves)),
+            n_known=0 if projections is None else int(np.count_nonzero(~unknown(projections))),
         )
 
     def _counted(
@@ -266,19 +270,19 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
     ) -> np.ndarray:
         """Which samples say something, (N,): without motion or a projection there is no direction to say it of."""
         if self.risk == "auto" and projections is not None:
-            moves = moves | risks.informative(projections)
+            moves = moves | informative(projections)
         counted = np.ones_like(moves) if self.risk in ("direct", "constrained") else moves
         return counted if weights is None else counted & (weights > 0)
 
     def _include(self, tally: Tally) -> None:
         total = Tally(
             tuple(self.moments_),
-            self.n_samples_seen_,
-            self.n_zero_actions_,
-            self.longest_action_,
+            n_samples=self.n_samples_seen_,
+            n_zero=self.n_zero_actions_,
+            longest=self.longest_action_,
             # Policies saved before these were kept know no shorter one than any, and of no constraint.
-            getattr(self, "shortest_action_", math.inf),
-            getattr(self, "n_known_constraints_", 0),
+            shortest=getattr(self, "shortest_action_", math.inf),
+            n_known=getattr(self, "n_known_constraints_", 0),
         )
         total += tally
         self.moments_ = list(total.moments)

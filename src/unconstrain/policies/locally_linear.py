@@ -6,7 +6,7 @@ from unconstrain.accumulation import local_moments
 from unconstrain.features.centers import normalized_activations, place
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
-from unconstrain.risk import Sight
+from unconstrain.sight import Sight
 from unconstrain.uncertainty import Posterior, local_covariance
 from unconstrain.validation import check_number
 

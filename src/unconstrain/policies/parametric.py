@@ -6,7 +6,7 @@ from unconstrain.accumulation import parametric_moments
 from unconstrain.features.full import as_policy_features
 from unconstrain.moments import Moments
 from unconstrain.policies.base import Policy
-from unconstrain.risk import Sight
+from unconstrain.sight import Sight
 from unconstrain.uncertainty import Posterior, parametric_covariance
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from unconstrain.moments import Moments
-from unconstrain.risk import NO_MOTION
+from unconstrain.sight import NO_MOTION
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from unconstrain.errors import DataError
 from unconstrain.readers.blocks import Array
 from unconstrain.readers.reading import Reading
 from unconstrain.readers.shards import Field, Piece, Shards
-from unconstrain.risk import unknown
+from unconstrain.sight import unknown
 from unconstrain.validation import NOT_IDEMPOTENT, not_idempotent
 
 

@@ -15,13 +15,15 @@ import numpy as np
 
 from unconstrain.features import FullFeatures, PolicyFeatures
 from unconstrain.features.centers import activations
+from unconstrain.features.full import with_one
 from unconstrain.moments import Moments
 from unconstrain.parallel import blocks, shared_out
+from unconstrain.products import distinct_products, n_pairs, pair_index, pairs
 from unconstrain.sight import Sight
 
 # Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
 # in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.
-PRODUCTS_IN_BLOCK = 2**18
+PRODUCTS_IN_BLOCK = 2**20
 LOCAL_PRODUCTS_IN_BLOCK = 2**19
 ROWS_IN_BLOCK = 2**21
 
@@ -47,7 +49,7 @@ def parametric_moments(
             return _whole_moments(features, X, seen, weights)
         M, d, k = features.n_basis_, seen.n_actions, seen.n_rows
         # Products halve the arithmetic; they pay as long as making them is no more work than making V.
-        if k > 1 or _pairs(M) + _pairs(d) <= 2 * features.n_parameters_:
+        if k > 1 or n_pairs(M) + n_pairs(d) <= 2 * features.n_parameters_:
             return _product_moments(features, X, seen, weights)
     return _row_moments(features, X, seen, weights)
 
@@ -60,14 +62,14 @@ def local_moments(
     Parameters are in the order of B_m's rows. centers (M, n), width σ, states X (N, n), weights (N,).
     """
     M, n, d = len(centers), X.shape[1], seen.n_actions
-    pairs_b, pairs_q = _pairs(n + 1), (1 if seen.whole else _pairs(d))
+    pairs_b, pairs_q = n_pairs(n + 1), (1 if seen.whole else n_pairs(d))
     n_products, n_pulls = pairs_b * pairs_q, d * (n + 1)
     # All that is summed, a row each: the distinct entries of H, then g, s and the weight itself.
     n_summed = n_products + n_pulls + 2
     size = _rows(LOCAL_PRODUCTS_IN_BLOCK, n_summed)
 
     def add(block: slice, totals: Totals) -> None:
-        B, part = _with_one(X[block]), seen[block]
+        B, part = with_one(X[block]), seen[block]
         rows = part.rows
         receptive = activations(X[block], centers, width)
         near = receptive.max(axis=0) > NEGLIGIBLE
@@ -94,50 +96,29 @@ def local_moments(
     squares, weight = total[:, -2].copy(), total[:, -1].copy()
     if seen.whole:
         return Moments(
-            H[:, _pair_index(n + 1)], g.reshape(M, d, n + 1).swapaxes(1, 2), squares, weight, len(X)
+            H[:, pair_index(n + 1)], g.reshape(M, d, n + 1).swapaxes(1, 2), squares, weight, len(X)
         )
     H = _unfold(H.reshape(M, pairs_b, pairs_q), n + 1, d)
     return Moments(H, g[:, :, None].copy(), squares, weight, len(X))
-
-
-def distinct_products(
-    A: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
-) -> np.ndarray:
-    """Products ω a_i a_j, i <= j, of the columns of A (N, k), weighted (N,): (k(k+1)/2, N).
-
-    Rows are in the order of the upper triangle; `out` may hold them.
-    """
-    k = A.shape[1]
-    T = np.ascontiguousarray(A.T)
-    # k products, where weighing what comes out would be k(k+1)/2.
-    weighted = T if weights is None else T * weights
-    products = np.empty((_pairs(k), len(A))) if out is None else out
-    row = 0
-    for i in range(k):
-        np.multiply(weighted[i], T[i:], out=products[row : row + k - i])
-        row += k - i
-    return products
 
 
 def _product_moments(
     features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None
 ) -> Moments:
     M, d = features.n_basis_, seen.n_actions
-    size = _rows(PRODUCTS_IN_BLOCK, _pairs(M) + _pairs(d))
+    size = _rows(PRODUCTS_IN_BLOCK, n_pairs(M) + n_pairs(d))
 
     def add(block: slice, totals: Totals) -> None:
         B, part, omega = features.basis(X[block]), seen[block], None if weights is None else weights[block]
         rows, targets = part.rows, part.targets
-        space = _space("products", _pairs(M) + _pairs(d), size)[:, : len(B)]
-        of_basis = distinct_products(B, out=space[: _pairs(M)])
-        totals[0] += _narrow(of_basis, _seen_products(rows, omega, space[_pairs(M) :]))
-        pull, squares = _pull(rows, targets).T, part.squares
+        space = _space("products", n_pairs(M) + n_pairs(d), size)[:, : len(B)]
+        of_basis = distinct_products(B, out=space[: n_pairs(M)])
+        totals[0] += _narrow(of_basis, _seen_products(rows, omega, space[n_pairs(M) :]))
+        pull = _pull(rows, targets).T
         totals[1] += (pull if omega is None else pull * omega) @ B
-        totals[2] += squares.sum() if omega is None else squares @ omega
 
-    shapes = [(_pairs(M), _pairs(d)), (d, M), ()]
-    products, g, squares = _sum_over_blocks(len(X), size, shapes, add)
-    return Moments(_unfold(products, M, d), g.reshape(-1, 1), squares, _weight(weights, X), len(X))
+    products, g = _sum_over_blocks(len(X), size, [(n_pairs(M), n_pairs(d)), (d, M)], add)
+    return Moments(_unfold(products, M, d), g.reshape(-1, 1), *_squares_and_weight(seen, weights), len(X))
 
 
 def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
@@ -167,10 +148,9 @@ def _whole_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: 
             B, targets = B * root, targets * root
         totals[0] += B.T @ B
         totals[1] += B.T @ targets
-        totals[2] += np.einsum("nd,nd->", targets, targets)
 
-    H, g, squares = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, M), [(M, M), (M, d), ()], add)
-    return Moments(H, g, squares, _weight(weights, X), len(X))
+    H, g = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, M), [(M, M), (M, d)], add)
+    return Moments(H, g, *_squares_and_weight(seen, weights), len(X))
 
 
 def _row_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None) -> Moments:
@@ -178,23 +158,26 @@ def _row_moments(features: PolicyFeatures, X: np.ndarray, seen: Sight, weights: 
 
     def add(block: slice, totals: Totals) -> None:
         part = seen[block]
-        rows, targets, squares = part.rows, part.targets, part.squares
+        # A row a sample, as V is made.
+        rows, targets = np.ascontiguousarray(part.rows), part.targets
         if weights is not None:
             root = np.sqrt(weights[block, None])
-            rows, targets, squares = rows * root[:, None], targets * root, squares * weights[block]
+            rows, targets = rows * root[:, None], targets * root
         states = X[block].astype(np.float64, copy=False)
         for k in range(part.n_rows):
             V = features.along(states, rows[:, k])
             totals[0] += V.T @ V
             totals[1] += V.T @ targets[:, k, None]
-        totals[2] += squares.sum()
 
-    H, g, squares = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, P), [(P, P), (P, 1), ()], add)
-    return Moments(H, g, squares, _weight(weights, X), len(X))
+    H, g = _sum_over_blocks(len(X), _rows(ROWS_IN_BLOCK, P), [(P, P), (P, 1)], add)
+    return Moments(H, g, *_squares_and_weight(seen, weights), len(X))
 
 
-def _weight(weights: np.ndarray | None, X: np.ndarray) -> np.ndarray:
-    return np.asarray(float(len(X)) if weights is None else np.sum(weights))
+def _squares_and_weight(seen: Sight, weights: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """`Σ ω ‖Q u‖²` and `Σ ω`."""
+    if weights is None:
+        return np.asarray(seen.squares.sum()), np.asarray(float(len(seen)))
+    return np.asarray(seen.squares @ weights), np.asarray(weights.sum())
 
 
 def _sum_over_blocks(
@@ -226,7 +209,8 @@ def _space(name: str, *shape: int) -> np.ndarray:
 
 def _rows(numbers: int, width: int) -> int:
     """How many samples a block of so many numbers holds: few enough for the cache, enough to be worth a call."""
-    return max(256, min(numbers // width, 8192))
+    size = max(256, min(numbers // width, 11 * SAMPLES_IN_PIECE))
+    return size - size % SAMPLES_IN_PIECE if size > SAMPLES_IN_PIECE else size
 
 
 def _seen_products(
@@ -235,7 +219,7 @@ def _seen_products(
     """The distinct entries of `ω QᵀQ`, (d(d+1)/2, N), for rows Q (N, k, d), weights (N,); `out` may hold them."""
     if rows.shape[1] == 1:
         return distinct_products(rows[:, 0], weights, out)
-    i, j = np.triu_indices(rows.shape[2])
+    i, j = pairs(rows.shape[2])
     products = np.einsum("nki,nkj->nij", rows, rows)[:, i, j].T
     return products if weights is None else products * weights
 
@@ -249,22 +233,6 @@ def _pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
 def _unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
     """H (..., dM, dM) from its distinct entries (..., M(M+1)/2, d(d+1)/2)."""
-    over_q = products[..., _pair_index(d)]  # (..., pairs of b, d, d)
-    full = np.moveaxis(over_q, -3, -1)[..., _pair_index(M)]  # (..., d, d, M, M)
+    over_q = products[..., pair_index(d)]  # (..., pairs of b, d, d)
+    full = np.moveaxis(over_q, -3, -1)[..., pair_index(M)]  # (..., d, d, M, M)
     return np.ascontiguousarray(full.swapaxes(-2, -3)).reshape(*products.shape[:-2], d * M, d * M)
-
-
-def _pairs(k: int) -> int:
-    return k * (k + 1) // 2
-
-
-def _pair_index(k: int) -> np.ndarray:
-    """Where the product of columns i and j stands among the distinct ones, (k, k)."""
-    index = np.empty((k, k), dtype=np.intp)
-    i, j = np.triu_indices(k)
-    index[i, j] = index[j, i] = np.arange(len(i))
-    return index
-
-
-def _with_one(X: np.ndarray) -> np.ndarray:
-    return np.vstack([X.T, np.ones(len(X))]).T  # a row a feature, as their products are

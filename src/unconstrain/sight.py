@@ -115,21 +115,22 @@ class AlongMotion:
     Directions are worked out a block at a time, in the processor's cache: looking at them is then cheaper than
     fetching them from memory would be.
 
-    actions: (N, d), of any precision. lengths: `r`, (N,), zero where nothing moves.
+    actions: (N, d), of any precision. lengths: `r`, (N,), and inverse: `1/r`, both zero where nothing moves.
     """
 
     actions: np.ndarray
     lengths: np.ndarray
+    inverse: np.ndarray
 
     def __len__(self) -> int:
         return len(self.lengths)
 
     def __getitem__(self, index) -> "AlongMotion":
         if isinstance(index, slice):
-            return AlongMotion(self.actions[index], self.lengths[index])
+            return AlongMotion(self.actions[index], self.lengths[index], self.inverse[index])
         index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
         # Stored a row a dimension, along which sums run.
-        return AlongMotion(self.actions.T.take(index, axis=1).T, self.lengths[index])
+        return AlongMotion(self.actions.T.take(index, axis=1).T, self.lengths[index], self.inverse[index])
 
     @property
     def whole(self) -> bool:
@@ -145,10 +146,8 @@ class AlongMotion:
 
     @property
     def rows(self) -> np.ndarray:
-        r = self.lengths
-        inverse = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0)
-        # Stored a row a dimension, which is how products of directions are formed.
-        return np.multiply(self.actions.T, inverse, order="C").T[:, None, :]
+        # Stored a row a dimension, along which products of directions are formed.
+        return np.multiply(self.actions.T, self.inverse, order="C").T[:, None, :]
 
     @property
     def targets(self) -> np.ndarray:
@@ -208,4 +207,4 @@ def _along_motion(U: np.ndarray, r: np.ndarray | None = None) -> AlongMotion:
     if r is None:
         r = lengths(U)
         r[r <= NO_MOTION * r.max(initial=0.0)] = 0.0
-    return AlongMotion(U, r)
+    return AlongMotion(U, r, np.divide(1.0, r, out=np.zeros_like(r), where=r > 0))

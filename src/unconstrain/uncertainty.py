@@ -25,10 +25,10 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import elementwise
 
-from unconstrain.accumulation import distinct_products
 from unconstrain.features import FullFeatures, PolicyFeatures
 from unconstrain.features.centers import normalized_activations
 from unconstrain.moments import Moments
+from unconstrain.products import distinct_products, pairs
 from unconstrain.validation import check_number
 
 # Where λ is searched, relative to the largest eigenvalue of H, and at how many values before the search is refined.
@@ -162,7 +162,7 @@ def local_covariance(
     shared = posterior.mean.shape[-1] > 1
     blocks = posterior.covariance.reshape(M, *((1, n + 1, 1, n + 1) if shared else (d, n + 1, d, n + 1)))
     blocks = blocks.transpose(0, 2, 4, 1, 3)  # (M, b, b', j, j')
-    i, j = np.triu_indices(n + 1)
+    i, j = pairs(n + 1)
     entries = blocks[:, i, j] + np.where(i == j, 0.0, 1.0)[:, None, None] * blocks[:, j, i]
     models = posterior.mean.swapaxes(-1, -2).reshape(M, d, n + 1)
     slopes, offsets = models[:, :, :n].reshape(-1, n).T, models[:, :, n]

@@ -12,6 +12,13 @@ from unconstrain.errors import PolicyError
 from unconstrain.features.base import PolicyFeatures, fitted, is_policy_features
 
 
+def with_one(X: np.ndarray) -> np.ndarray:
+    """`(x, 1)` of states X (N, n): (N, n + 1), in double precision; stored a row a feature, as products are formed."""
+    rows = np.empty((X.shape[1] + 1, len(X)))
+    rows[:-1], rows[-1] = X.T, 1.0
+    return rows.T
+
+
 class FullFeatures(BaseEstimator):
     """`pi(x) = W b(x)` with W (d, M) free.
 
@@ -39,8 +46,7 @@ class FullFeatures(BaseEstimator):
     def basis(self, X: np.ndarray) -> np.ndarray:
         """`b(x)` at states X (N, n): an array (N, M)."""
         if self.transformer_ is None:
-            # Stored a row a feature, which is how their products are formed.
-            return np.vstack([X.T, np.ones(len(X))]).T
+            return with_one(X)
         B = self.transformer_.transform(X.astype(np.float64, copy=False))
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unconstrain.accumulation import distinct_products
 from unconstrain.features.centers import normalized_activations
 from unconstrain.parallel import blocks
+from unconstrain.products import distinct_products, pairs
 from unconstrain.sight import directions
 
 NUMBERS_IN_BLOCK = 2**22
@@ -34,7 +34,7 @@ def coverage(X: np.ndarray, seen_at: np.ndarray, actions: np.ndarray, width: flo
     """At states X (Q, n), of movements with states `seen_at` (N, n) and actions (N, d); width σ."""
     unit, _ = directions(actions)
     d = unit.shape[1]
-    i, j = np.triu_indices(d)
+    i, j = pairs(d)
     products = distinct_products(unit).T
     second = np.empty((len(X), d, d))
     for rows in blocks(len(X), max(1, NUMBERS_IN_BLOCK // len(seen_at))):

@@ -15,8 +15,6 @@ RISKS = ("auto", "inconsistency", "direct", "constrained")
 # its direction is noise, and would be taught as truth.
 NO_MOTION = 1e-12
 
-ROWS_IN_BLOCK = 4096  # what a processor's cache holds of a few columns
-
 
 def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
     """Which actions (N, d) have a direction, as a mask (N,): those longer than `NO_MOTION` times `scale`.
@@ -35,11 +33,7 @@ def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def lengths(U: np.ndarray) -> np.ndarray:
     """`‖u‖`, (N,), of actions U (N, d), in double precision whatever theirs is."""
-    squares = np.empty(len(U))
-    for start in range(0, len(U), ROWS_IN_BLOCK):
-        block = slice(start, start + ROWS_IN_BLOCK)
-        part = U[block].astype(np.float64, copy=False)
-        np.einsum("nd,nd->n", part, part, out=squares[block])
+    squares = np.einsum("nd,nd->n", U, U, dtype=np.float64)
     return np.sqrt(squares, out=squares)
 
 

@@ -105,7 +105,7 @@ def fit_stream(
     progress : bool or function, optional
         True shows a bar with rows, rate and time left; a function is called with rows done and rows in all.
     batch_rows : int
-        How many samples are added up at a time.
+        How many samples, at most, are added up at a time.
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed: a random sample of the files'
         rows (all of them, if there are no more), the first rows of an iterable; of these, those that move, unless

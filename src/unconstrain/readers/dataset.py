@@ -99,7 +99,9 @@ class Dataset:
 
     def blocks(self, start: int = 0, stop: int | None = None) -> Generator[Block, None, None]:
         pieces = self.shards.pieces(self.columns, start, stop)
-        return self._whole_episodes(pieces, start) if self.needs_whole_episodes else self._even(pieces, start)
+        return (
+            self._whole_episodes(pieces, start) if self.needs_whole_episodes else self._blocks(pieces, start)
+        )
 
     def identity(self) -> str:
         files = list(zip(map(os.path.basename, self.shards.paths), self.shards.row_groups, strict=True))
@@ -146,17 +148,18 @@ class Dataset:
         n = len(self.state)
         return both[:n].T, both[n:].T
 
-    def _even(self, pieces: Iterator[Piece], start: int) -> Generator[Block, None, None]:
-        """Blocks of `batch_rows` rows, counted from `start`, whatever the files' own division."""
+    def _blocks(self, pieces: Iterator[Piece], start: int) -> Generator[Block, None, None]:
+        """Blocks of at most `batch_rows` rows, each of as many pieces as go into it: what was read at once stays so."""
         waiting: list[Piece] = []
         count = 0
         for piece in pieces:
-            while count + len(piece.rows) >= self.batch_rows:
-                missing = self.batch_rows - count
-                waiting.append(piece.slice(0, missing))
-                piece = piece.slice(missing, len(piece.rows) - missing)
-                yield Block(start, start + self.batch_rows, partial(self._loaded, waiting, start))
-                waiting, count, start = [], 0, start + self.batch_rows
+            if waiting and count + len(piece.rows) > self.batch_rows:
+                yield Block(start, start + count, partial(self._loaded, waiting, start))
+                waiting, count, start = [], 0, start + count
+            while len(piece.rows) > self.batch_rows:
+                stop = start + self.batch_rows
+                yield Block(start, stop, partial(self._loaded, [piece.slice(0, self.batch_rows)], start))
+                piece, start = piece.slice(self.batch_rows, len(piece.rows) - self.batch_rows), stop
             if len(piece.rows):
                 waiting.append(piece)
                 count += len(piece.rows)

@@ -28,6 +28,10 @@ SAMPLED_GROUPS = 16
 """Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
 
 
+Places = dict[str, list[tuple[int, int | None]]]
+"""By column, which rows of an array of numbers it goes to, and which of its components."""
+
+
 class Piece(NamedTuple):
     """Consecutive rows of one file: which file, its first row there, and the columns read."""
 
@@ -138,16 +142,20 @@ class Shards:
         shape = (len(fields), sum(len(piece.rows) for piece in pieces))
         single = all(_single(self._column(piece, field.column).type) for piece in pieces for field in fields)
         numbers: NDArray[Any] = np.empty(shape, np.float32 if single else np.float64)
-        columns: dict[str, list[tuple[int, int | None]]] = {}
+        columns: Places = {}
         for i, field in enumerate(fields):
             columns.setdefault(field.column, []).append((i, field.component))
-        at = 0
+        usual, at = True, 0
         for piece in pieces:
             part = numbers[:, at : at + len(piece.rows)]
-            for column, places in columns.items():
-                if not self._fill(part, piece, column, places):
-                    self._fill_slowly(part, piece, column, places, role)
             at += len(piece.rows)
+            usual = usual and self._fill(part, piece, columns)
+        # A sum of squares is finite and small if and only if every number is, and costs next to nothing. Where it
+        # overflows, as it does from 1e19 in single precision, the numbers are looked at one by one.
+        with np.errstate(over="ignore"):
+            usual = usual and float(np.dot(numbers.ravel(), numbers.ravel())) < 1e300
+        if not usual:
+            self._fill_slowly(numbers, pieces, columns, role)
         return numbers
 
     def labels(self, pieces: Sequence[Piece], column: str) -> NDArray[Any]:
@@ -217,50 +225,43 @@ class Shards:
 
         return place
 
-    def _fill(
-        self, numbers: NDArray[Any], piece: Piece, column: str, places: list[tuple[int, int | None]]
-    ) -> bool:
-        """Write a column's components into their rows of `numbers`; False if anything about them is unusual."""
-        values = self._column(piece, column)
-        if values.null_count:
-            return False
-        if places[0][1] is None:
-            if not (pa.types.is_floating(values.type) or pa.types.is_integer(values.type)):
+    def _fill(self, numbers: NDArray[Any], piece: Piece, columns: Places) -> bool:
+        """Write a piece's columns into their rows of `numbers`; False if anything about them is unusual."""
+        arrays: list[Any] = [None] * len(numbers)
+        for column, places in columns.items():
+            values = self._column(piece, column)
+            if values.null_count:
                 return False
-            for i, _ in places:
-                numbers[i] = values.to_numpy(zero_copy_only=False)
-        else:
-            flat = values.flatten() if hasattr(values, "flatten") else None
-            if flat is None or flat.null_count or not pa.types.is_floating(flat.type):
+            if places[0][1] is None:
+                if not (pa.types.is_floating(values.type) or pa.types.is_integer(values.type)):
+                    return False
+                flat = values.to_numpy(zero_copy_only=False)
+                for i, _ in places:
+                    arrays[i] = flat
+                continue
+            rows = _matrix(values)
+            if rows is None or any(part is None or part >= rows.shape[1] for _, part in places):
                 return False
-            width = len(flat) // max(len(values), 1)
-            if pa.types.is_fixed_size_list(values.type):
-                regular = True
-            else:
-                regular = bool(np.all(np.diff(values.offsets.to_numpy()) == width))
-            if not regular or any(component is None or component >= width for _, component in places):
-                return False
-            rows = flat.to_numpy().reshape(-1, width)
-            for i, component in places:
-                numbers[i] = rows[:, component]
-        # A sum of squares is finite and small if and only if every number is, and costs next to nothing. Where it
-        # overflows, as it does from 1e19 in single precision, the numbers are looked at one by one.
-        with np.errstate(over="ignore"):
-            return all(float(np.dot(numbers[i], numbers[i])) < 1e300 for i, _ in places)
+            for i, part in places:
+                arrays[i] = rows[:, part]
+        np.stack(
+            arrays, out=numbers
+        )  # one operation, where threads would wait for each other at each of many
+        return True
 
     def _fill_slowly(
-        self,
-        numbers: NDArray[Any],
-        piece: Piece,
-        column: str,
-        places: list[tuple[int, int | None]],
-        role: str,
+        self, numbers: NDArray[Any], pieces: Sequence[Piece], columns: Places, role: str
     ) -> None:
-        table = self.table(piece, [column])
-        for i, component in places:
-            key = column if component is None else f"{column}[{component}]"
-            (position,) = table.find(role, key)
-            numbers[i] = table.numbers(position)
+        at = 0
+        for piece in pieces:
+            stop = at + len(piece.rows)
+            for column, places in columns.items():
+                table = self.table(piece, [column])
+                for i, component in places:
+                    key = column if component is None else f"{column}[{component}]"
+                    (position,) = table.find(role, key)
+                    numbers[i, at:stop] = table.numbers(position)
+            at = stop
 
     def _column(self, piece: Piece, column: str) -> Any:
         index = piece.rows.schema.get_field_index(column)
@@ -323,6 +324,17 @@ class _NamedErrors:
         if isinstance(error, FileNotFoundError | PermissionError):
             raise DataError(f"{self.shown} cannot be read: {error.strerror or error}") from error
         raise DataError(f"{self.shown} is damaged or not a Parquet file; write it again") from error
+
+
+def _matrix(values: Any) -> Array | None:
+    """A column of lists as (N, k), or None where it holds anything but k floating-point numbers in each row."""
+    flat = values.flatten() if hasattr(values, "flatten") else None
+    if flat is None or flat.null_count or not pa.types.is_floating(flat.type):
+        return None
+    width = len(flat) // max(len(values), 1)
+    if not pa.types.is_fixed_size_list(values.type) and np.any(np.diff(values.offsets.to_numpy()) != width):
+        return None
+    return flat.to_numpy().reshape(-1, width)
 
 
 def _single(kind: pa.DataType) -> bool:

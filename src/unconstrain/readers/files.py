@@ -44,12 +44,12 @@ def existing(shown: str) -> Path:
         raise DataError(
             f"{shown} is a folder without Parquet files: give its files, or a pattern such as {path / '*.csv'}"
         )
+    if not path.exists():
+        raise DataError(f"there is no file {shown}; check the path, which starts from the current folder")
     if path.suffix.lower() not in SUFFIXES:
         raise DataError(
             f"{shown} cannot be read by its suffix {path.suffix!r}; those known are {', '.join(SUFFIXES)}"
         )
-    if not path.exists():
-        raise DataError(f"there is no file {shown}; check the path, which starts from the current folder")
     if path.stat().st_size == 0:
         raise DataError(f"{shown} is empty: there is nothing to read")
     return path

@@ -23,7 +23,7 @@ from unconstrain.readers.table import Table, row
 Array = NDArray[np.float64]
 
 SUFFIXES = (".parquet", ".pq")
-DECODED = 65536  # rows decoded at a time: what a processor's cache holds of a few columns
+DECODED = 131_072  # rows decoded at a time: as many as cost little memory, since every start on a column costs time
 SAMPLED_GROUPS = 16
 """Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
 
@@ -98,7 +98,7 @@ class Shards:
         return columns_of(pa.Table.from_batches([rows]), self.name(file)), schema
 
     def pieces(self, columns: Sequence[str], start: int = 0, stop: int | None = None) -> Iterator[Piece]:
-        """Rows `start` to `stop` of these columns, in order, a few ten thousand at a time."""
+        """Rows `start` to `stop` of these columns, in order, some at a time."""
         stop = self.n_rows if stop is None else min(stop, self.n_rows)
         first = 0  # row of the file at hand
         for file, groups in enumerate(self.row_groups):

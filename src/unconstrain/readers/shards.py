@@ -23,9 +23,8 @@ from unconstrain.readers.table import Table, row
 Array = NDArray[np.float64]
 
 SUFFIXES = (".parquet", ".pq")
-DECODED = (
-    131_072  # rows decoded at a time: as many as cost little memory, since every start on a column costs time
-)
+DECODED = 131_072
+"""Rows decoded at a time: as many as cost little memory, since every start on a column costs time."""
 SAMPLED_GROUPS = 16
 """Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
 

@@ -5,7 +5,6 @@ import pytest
 import recordings
 import test_stream_known as known
 import unconstrain as uc
-from test_cli import run  # noqa: F401 - a fixture
 from test_stream import EPISODES, TIME, U, X, assert_same_fit
 
 COLUMNS = ("--state", "x0,x1,x2", "--action", "u0,u1,u2", "--episode", "episode_index")
@@ -21,7 +20,7 @@ def touched(tmp_path):
     return recordings.write(tmp_path / "felt", X, U, EPISODES, TIME, [], more=known.TOUCHED).name
 
 
-def test_a_folder_is_read_as_a_stream(run, folder):  # noqa: F811
+def test_a_folder_is_read_as_a_stream(run, folder):
     code, out, err = run("fit", folder, *COLUMNS, "--model", "linear", "--checkpoint", "run.npz")
     assert code == 0, err
     assert f"read: {len(X)} samples in {len(np.unique(EPISODES))} episodes" in out
@@ -35,7 +34,7 @@ def test_a_folder_is_read_as_a_stream(run, folder):  # noqa: F811
     assert "checkpoint of another policy" in err
 
 
-def test_other_folders_are_read_as_the_one_learnt_from(run, folder):  # noqa: F811
+def test_other_folders_are_read_as_the_one_learnt_from(run, folder):
     code, out, err = run("fit", folder, *COLUMNS, "--model", "linear")
     assert code == 0, err
     assert "unconstrain evaluate policy.skops" in out
@@ -44,7 +43,7 @@ def test_other_folders_are_read_as_the_one_learnt_from(run, folder):  # noqa: F8
     assert f"read: {len(X)} samples, {len(np.unique(EPISODES))} episodes" in out
 
 
-def test_what_needs_all_data_gets_a_folder_at_once(run, folder, tmp_path):  # noqa: F811
+def test_what_needs_all_data_gets_a_folder_at_once(run, folder, tmp_path):
     code, out, err = run(
         "fit", folder, *COLUMNS, "--model", "linear", "--figure", "a.png", "--min-speed", "0.01"
     )
@@ -53,7 +52,7 @@ def test_what_needs_all_data_gets_a_folder_at_once(run, folder, tmp_path):  # no
     assert (tmp_path / "a.png").exists()
 
 
-def test_a_cluster_of_this_machine(run, folder):  # noqa: F811
+def test_a_cluster_of_this_machine(run, folder):
     pytest.importorskip("distributed")
     code, _, err = run("fit", folder, *COLUMNS, "--model", "linear", "--cluster", "local")
     assert code == 0, err
@@ -62,7 +61,7 @@ def test_a_cluster_of_this_machine(run, folder):  # noqa: F811
     )
 
 
-def test_a_worker_that_cannot_read_says_so_in_one_sentence(run, touched):  # noqa: F811
+def test_a_worker_that_cannot_read_says_so_in_one_sentence(run, touched):
     pytest.importorskip("distributed")
     options = ("--force", "f0,f1,f2", "--force-threshold", "0", "--cluster", "local")
     code, _, err = run("fit", touched, *COLUMNS, *options)
@@ -71,7 +70,7 @@ def test_a_worker_that_cannot_read_says_so_in_one_sentence(run, touched):  # noq
     assert "Traceback" not in err
 
 
-def test_names_that_hold_commas_are_quoted(run, tmp_path):  # noqa: F811
+def test_names_that_hold_commas_are_quoted(run, tmp_path):
     table = pq.read_table(recordings.write(tmp_path / "parts", X, U, EPISODES, TIME, []) / "part-0.parquet")
     names = ["größe, in m" if name == "x0" else name for name in table.column_names]
     pq.write_table(table.rename_columns(names), tmp_path / "named.parquet")
@@ -83,7 +82,7 @@ def test_names_that_hold_commas_are_quoted(run, tmp_path):  # noqa: F811
 
 
 @pytest.mark.parametrize("where", [(), ("--checkpoint", "run.npz"), ("--cluster", "local")])
-def test_what_is_known_of_constraints_is_used(run, touched, where):  # noqa: F811
+def test_what_is_known_of_constraints_is_used(run, touched, where):
     if "--cluster" in where:
         pytest.importorskip("distributed")
     options = ("--force", "f0,f1,f2", "--force-threshold", 2, "--free", "free")
@@ -96,7 +95,7 @@ def test_what_is_known_of_constraints_is_used(run, touched, where):  # noqa: F81
     known.assert_same_known(uc.load_policy("policy.skops"), whole)
 
 
-def test_files_that_uc_save_wrote_need_no_more_than_the_columns_that_tell(run, tmp_path):  # noqa: F811
+def test_files_that_uc_save_wrote_need_no_more_than_the_columns_that_tell(run, tmp_path):
     demos = uc.Demonstrations(X, U, EPISODES, free=known.TOUCHED["free"])
     (tmp_path / "saved").mkdir()
     uc.save(demos, tmp_path / "saved" / "a.parquet")
@@ -106,7 +105,7 @@ def test_files_that_uc_save_wrote_need_no_more_than_the_columns_that_tell(run, t
     assert uc.load_policy("policy.skops").risk == "auto"
 
 
-def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):  # noqa: F811
+def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):
     tally, calls = uc.ParametricPolicy._tally, []
 
     def interrupted(self, *args, **kwargs):
@@ -138,7 +137,7 @@ def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):  # noqa: F811
         (("--cluster", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
     ],
 )
-def test_mistakes_are_told_in_one_sentence(run, folder, options, sentence):  # noqa: F811
+def test_mistakes_are_told_in_one_sentence(run, folder, options, sentence):
     code, _, err = run("fit", folder, *COLUMNS, *options)
     assert code == 2
     assert sentence in err

@@ -202,44 +202,27 @@ def table(tmp_path, monkeypatch):
     return ["--state", "x,y,z", "--action", "vx,vy,vz"]
 
 
-def program(monkeypatch, capsys, *arguments):
-    from unconstrain.cli import main
-
-    monkeypatch.setattr("sys.argv", ["unconstrain", *map(str, arguments)])
-    try:
-        main()
-        code = 0
-    except SystemExit as end:
-        code = end.code or 0
-    said = capsys.readouterr()
-    return code, said.out, said.err
-
-
-def test_the_command_prints_saves_and_draws_the_constraint(table, monkeypatch, capsys, tmp_path):
-    code, out, _ = program(
-        monkeypatch, capsys, "constraints", "table.csv", *table, "--out", "c.skops", "--figure", "c.png"
-    )
+def test_the_command_prints_saves_and_draws_the_constraint(run, table, tmp_path):
+    code, out, _ = run("constraints", "table.csv", *table, "--out", "c.skops", "--figure", "c.png")
     assert code == 0
     assert "0.800 vz + 0.600 vy ≈ 0" in out
     assert "1 of 3 directions" in out
     assert (tmp_path / "c.png").stat().st_size > 0
     assert uc.load_constraint("c.skops").n_constraints_ == 1
-    code, out, _ = program(monkeypatch, capsys, "constraints", "table.csv", *table, "--model", "rbf")
+    code, out, _ = run("constraints", "table.csv", *table, "--model", "rbf")
     assert code == 0
     assert "0.800 vz + 0.600 vy ≈ 0" in out
 
 
-def test_fit_takes_forces_and_flags(table, monkeypatch, capsys):
+def test_fit_takes_forces_and_flags(run, table):
     forces = ["--force", "fx,fy,fz", "--force-threshold", "2"]
-    code, out, _ = program(monkeypatch, capsys, "fit", "table.csv", *table, "--model", "linear", *forces)
+    code, out, _ = run("fit", "table.csv", *table, "--model", "linear", *forces)
     assert code == 0
     assert "75.0% in contact, 25.0% free" in out
     assert "held-out error" in out
     assert "held-out inconsistency" not in out
     assert uc.load_policy("policy.skops").risk == "auto"
-    code, out, _ = program(
-        monkeypatch, capsys, "fit", "table.csv", *table, "--model", "linear", "--free", "free"
-    )
+    code, out, _ = run("fit", "table.csv", *table, "--model", "linear", "--free", "free")
     assert "known of 25.0%" in out
 
 
@@ -257,10 +240,8 @@ def test_fit_takes_forces_and_flags(table, monkeypatch, capsys):
         (["fit", "table.csv", "--force-threshold", "2"], "--force-threshold is for forces"),
     ],
 )
-def test_mistakes_on_the_command_line_are_one_sentence(
-    table, monkeypatch, capsys, tmp_path, arguments, sentence
-):
-    code, _, err = program(monkeypatch, capsys, *arguments, *table)
+def test_mistakes_on_the_command_line_are_one_sentence(run, table, tmp_path, arguments, sentence):
+    code, _, err = run(*arguments, *table)
     assert code == 2
     assert sentence in err
     assert "Traceback" not in err

@@ -28,10 +28,13 @@ def test_a_lerobot_dataset_needs_no_columns(tmp_path, version):
 
 
 def test_the_derivative_of_a_dataset_that_has_actions_too(tmp_path):
-    recordings.lerobot(tmp_path / "robot", X, U, EPISODES, TIME)
-    demos = uc.load(tmp_path / "robot", action="differentiate")
+    folder = recordings.lerobot(tmp_path / "robot", X, U, EPISODES, TIME)
+    demos = uc.load(folder, action="differentiate")
     assert demos.action_names == tuple(f"{name}_dot" for name in demos.state_names)
-    np.testing.assert_allclose(demos.actions[100], np.gradient(X[:, 0:3], 0.02, axis=0)[100], atol=0.1)
+    states, stamps = (a.astype(np.float32).astype(float) for a in (X, TIME))  # as the dataset holds them
+    np.savez(tmp_path / "one.npz", x=states, t=stamps, e=EPISODES)
+    alone = uc.load(tmp_path / "one.npz", state="x", time="t", episode="e")
+    np.testing.assert_allclose(demos.actions, alone.actions, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("lists", [False, True])
@@ -88,6 +91,22 @@ def test_mistakes_are_told_in_one_sentence(tmp_path):
     recordings.write(tmp_path / "parts", bad, U, EPISODES, TIME, CUTS)
     with pytest.raises(DataError, match=r"'x1' holds nan at row 4 of .*part-2.parquet \(counted from 0\)"):
         uc.load(folder, **COLUMNS)
+    lists = recordings.write(tmp_path / "lists", X, U, EPISODES, TIME, CUTS, lists=True)
+    pq.write_table(
+        pa.table(
+            {
+                "observation.state": [[1.0, 2.0, 3.0], [1.0]],
+                "action": [[1.0, 2.0, 3.0]] * 2,
+                "episode_index": [1, 1],
+            }
+        ),
+        lists / "part-9.parquet",
+    )
+    roles = {"state": "observation.state", "action": "action", "episode": "episode_index"}
+    with pytest.raises(
+        DataError, match=r"part-9.parquet: 'observation.state' holds lists that .* differ in length"
+    ):
+        uc.load(lists, **roles)
     (tmp_path / "empty").mkdir()
     with pytest.raises(DataError, match="is a folder without Parquet files"):
         uc.load(tmp_path / "empty", state="x0")

@@ -5,8 +5,10 @@ from hypothesis import strategies as st
 from sklearn.preprocessing import PolynomialFeatures
 
 from problems import problems
+from unconstrain import accumulation
 from unconstrain.accumulation import local_moments, parametric_moments
 from unconstrain.features import FullFeatures
+from unconstrain.features.centers import activations
 from unconstrain.moments import Moments
 from unconstrain.sight import RISKS, sight
 
@@ -63,18 +65,22 @@ def test_local_moments_are_parametric_moments_weighted(problem, name):
         np.testing.assert_allclose(local.squares[m], alone.squares, rtol=1e-9)
 
 
-def test_models_far_from_a_block_are_left_out_of_it_and_nothing_changes():
-    rng = np.random.default_rng(0)
-    X = np.linspace(0, 200, 3000)[:, None] + rng.normal(size=(3000, 2))  # one long movement
-    U, centers = rng.normal(size=(3000, 2)), X[::100].copy()
+def test_models_far_from_a_block_are_left_out_of_it_and_nothing_changes(monkeypatch):
+    rng, N = np.random.default_rng(0), 20_000  # several blocks
+    X = np.linspace(0, 400, N)[:, None] + rng.normal(size=(N, 2))  # one long movement
+    U, centers = rng.normal(size=(N, 2)), X[::1000].copy()
     seen = sight("inconsistency", U)
     local = local_moments(centers, 1.0, X, seen)
-    V = seen.rows[:, 0, :, None] * np.column_stack([X, np.ones(3000)])[:, None]
-    V = V.reshape(3000, -1)
+    V = seen.rows[:, 0, :, None] * np.column_stack([X, np.ones(N)])[:, None]
+    V = V.reshape(N, -1)
     for m, center in enumerate(centers):
         receptive = np.exp(-np.sum((X - center) ** 2, axis=1) / 2)
         H = V.T @ (V * receptive[:, None])
         np.testing.assert_allclose(local.H[m], H, rtol=1e-12, atol=1e-14 * abs(H).max())
+    in_sight = activations(X[: N // 4], centers, 1.0).max(axis=0) > accumulation.NEGLIGIBLE
+    assert 0 < np.count_nonzero(in_sight) < len(centers)
+    monkeypatch.setattr(accumulation, "NEGLIGIBLE", 2.0)  # which leaves out every model
+    assert not local_moments(centers, 1.0, X, seen).H.any()
 
 
 @settings(deadline=None)

@@ -132,9 +132,9 @@ def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     if pieces < 2:
         return A @ B.T
     cut = pieces * SAMPLES_IN_PIECE
-    parts = (rows[:, :cut].reshape(len(rows), pieces, SAMPLES_IN_PIECE).swapaxes(0, 1) for rows in (A, B))
-    left, right = parts
-    return np.matmul(left, right.swapaxes(1, 2)).sum(axis=0) + A[:, cut:] @ B[:, cut:].T
+    left = A[:, :cut].reshape(a, pieces, SAMPLES_IN_PIECE).transpose(1, 0, 2)
+    right = B[:, :cut].reshape(b, pieces, SAMPLES_IN_PIECE).transpose(1, 2, 0)
+    return np.matmul(left, right).sum(axis=0) + A[:, cut:] @ B[:, cut:].T
 
 
 def _whole_moments(features: FullFeatures, X: np.ndarray, seen: Sight, weights: np.ndarray | None) -> Moments:

@@ -304,8 +304,7 @@ def _fields(table: Table, role: str, keys: Any) -> tuple[Field, ...]:
     for key in each:
         for position in table.find(role, key):
             column = table.columns[position]
-            component = int(column.name[len(column.part_of) + 1 : -1]) if column.part_of else None
-            fields.append(Field(column.part_of or column.name, component))
+            fields.append(Field(column.part_of or column.name, column.component))
     if not fields:
         raise DataError(f"no {role} columns were given for {table.path}; {table.listing()}")
     return tuple(fields)

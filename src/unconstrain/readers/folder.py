@@ -27,7 +27,7 @@ def expanded(files: Sequence[str], roles: Roles) -> list[str]:
     """The files meant, with those of a folder in its place where each is a recording by itself, as `save` writes it."""
     expanded: list[str] = []
     for shown in files:
-        if roles.state is None and is_meant(shown) and lerobot.opened(shown) is None:
+        if roles.state is None and is_meant(shown) and not lerobot.is_meant(shown):
             shards = Shards.find(shown)
             table, schema = shards.first_rows()
             if saved.roles(schema) is None:
@@ -51,17 +51,11 @@ def read(shown: str, roles: Roles) -> tuple[Table, Roles]:
     first, _ = shards.first_rows()
     if robot:
         roles = robot.roles(roles)
-    elif roles.state is None:
-        raise DataError(f"{shown}: give state=, the columns that are states; {first.listing()}")
     found = roles.positions(first)
     chosen = [first.columns[at] for positions in found.values() for at in positions]
     pieces = list(shards.pieces(list(dict.fromkeys(column.part_of or column.name for column in chosen))))
     tables = [shards.table(piece, list(piece.rows.schema.names)) for piece in pieces]
-    columns = [
-        _joined(column, role, tables)
-        for role, at in found.items()
-        for column in (first.columns[i] for i in at)
-    ]
+    columns = [_joined(first.columns[i], role, tables) for role, where in found.items() for i in where]
     if robot:
         columns = [_renamed(column, robot) for column in columns]
     bounds = np.cumsum([0, *map(len, found.values())])
@@ -82,7 +76,8 @@ def _joined(column: Column, role: str, tables: Sequence[Table]) -> Column:
     """A column of all pieces of the files."""
     parts: list[Any] = []
     for table in tables:
-        (at,) = table.find(role, column.name)
+        whole = column.part_of in table.unusable  # an array that has another shape in this file
+        (at,) = table.find(role, column.part_of if whole else column.name)
         values = table.columns[at].values
         parts += values.chunks if isinstance(values, pa.ChunkedArray) else [values]
     if len({part.type for part in parts}) > 1 and all(_is_number(part.type) for part in parts):
@@ -100,7 +95,7 @@ def _joined(column: Column, role: str, tables: Sequence[Table]) -> Column:
 def _renamed(column: Column, robot: lerobot.LeRobot) -> Column:
     """A component by the name that the dataset gives it."""
     names = robot.component_names(column.part_of)
-    return replace(column, name=names[int(column.name[len(column.part_of) + 1 : -1])]) if names else column
+    return replace(column, name=names[column.component]) if names and column.component is not None else column
 
 
 def _is_number(kind: pa.DataType) -> bool:

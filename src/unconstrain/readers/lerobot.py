@@ -19,6 +19,7 @@ from unconstrain.readers.shards import Shards
 from unconstrain.readers.table import Key
 
 STATE, ACTION, EPISODE, TIME = "observation.state", "action", "episode_index", "timestamp"
+ABOUT = "meta/info.json"
 VERSIONS = ("v2.0", "v2.1", "v3.0")
 
 
@@ -59,6 +60,11 @@ class LeRobot:
         return by_place(keys) if isinstance(keys, Key) else [by_place(key) for key in keys]
 
 
+def is_meant(folder: str | os.PathLike[str]) -> bool:
+    """Whether a folder of this machine is a dataset of this kind."""
+    return os.path.isfile(os.path.join(folder, ABOUT))
+
+
 def opened(folder: str | os.PathLike[str]) -> LeRobot | None:
     """The dataset in a folder (or URI), or None where the folder is not of this kind.
 
@@ -69,7 +75,7 @@ def opened(folder: str | os.PathLike[str]) -> LeRobot | None:
         filesystem, path = (
             pyarrow.fs.FileSystem.from_uri(shown) if "://" in shown else (pyarrow.fs.LocalFileSystem(), shown)
         )
-        meta = f"{path.rstrip('/')}/meta/info.json"
+        meta = f"{path.rstrip('/')}/{ABOUT}"
         if filesystem.get_file_info(meta).type != pyarrow.fs.FileType.File:
             return None
         with filesystem.open_input_stream(meta) as file:

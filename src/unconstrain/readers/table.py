@@ -36,6 +36,11 @@ class Column:
     values: Any
     part_of: str = ""
 
+    @property
+    def component(self) -> int | None:
+        """Which number of its array it is, or None for a column by itself."""
+        return int(self.name[len(self.part_of) + 1 : -1]) if self.part_of else None
+
 
 @dataclass(frozen=True)
 class Table:

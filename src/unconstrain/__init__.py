@@ -8,21 +8,24 @@
 
 from importlib.metadata import version
 
-from unconstrain import constraints, distributed, errors, features, moments, risk
-from unconstrain.comparison import select_policy
-from unconstrain.demonstrations import Demonstrations
-from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
-from unconstrain.identifiability import identifiability
-from unconstrain.learnt_constraints import (
+from unconstrain import constraints, errors, features
+from unconstrain import metrics as risk
+from unconstrain.constraints.learnt import (
     ConstantConstraint,
     ConstraintChain,
     FeatureConstraint,
     NullspaceComponent,
     load_constraint,
 )
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.diagnostics import identifiability
+from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
+from unconstrain.fitting import moments
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
-from unconstrain.readers import load, save
-from unconstrain.stream import fit_stream
+from unconstrain.recordings import load, save
+from unconstrain.scaling import cluster as distributed
+from unconstrain.scaling.stream import fit_stream
+from unconstrain.selection import select_policy
 
 __version__ = version("unconstrain")
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from unconstrain import atomic
 from unconstrain.errors import UnconstrainError
-from unconstrain.moments import Moments
+from unconstrain.fitting.moments import Moments
 
 FORMAT = 1
 NOTE = "unconstrain"

@@ -1,110 +1,286 @@
-"""Dealing episodes out to folds, choosing the weight decay λ from moments by fold, and what a policy explains."""
+"""Choosing among policies by what the recordings alone can tell: inconsistency on episodes held out.
 
-from collections.abc import Iterator
+Every candidate is fitted once, its samples added up by fold. Leaving a fold out is a subtraction of its moments, so
+the solution without fold k, with λ chosen anew among the other folds, costs no second pass over the data. Its
+predictions for the episodes of fold k are held against their actions, and all folds' errors are pooled:
 
+    E_i = 1/N Σ_k Σ_(n in fold k) (r_n - û_nᵀ pi_(without k)(x_n))²
+
+The folds are the same for all candidates. What features take from the states alone (centres, knots, ranges) they
+take from all of them, as one fit does; nothing of a held-out action enters. No true policy is asked for: that the
+least inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that
+no episode ever moved in are not judged. Where projections of some samples are known, their error is that under the
+constraint (`risk.auto`), which judges more of the policy.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import joblib
 import numpy as np
+from sklearn.base import clone
+from sklearn.preprocessing import SplineTransformer
 
-from unconstrain import risk
-from unconstrain.errors import DataError
-from unconstrain.moments import Moments
+from unconstrain.arrays import check_actions, check_groups, check_number, check_projections, check_samples
+from unconstrain.errors import PolicyError
+from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
+from unconstrain.fitting import solve as selection
+from unconstrain.fitting.observation import errors as squared_errors
+from unconstrain.fitting.observation import sight
+from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
+from unconstrain.policies.base import Policy
 
-N_ALPHAS = 25
-# λ from one that flattens the policy to one at the resolution of H, relative to H's largest eigenvalue.
-SMALLEST, LARGEST = 1e-12, 1e0
-# Candidates whose held-out risk is within this share of the least cannot be told apart, and the largest is taken:
-# where no sample shows a direction the risk is flat over many decades of λ, and a small λ would leave there whatever
-# slight misfits happen to ask for, many times the policy.
-INDISTINGUISHABLE = 0.01
+# What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
+MOST_PARAMETERS = 1000
+MOST_CENTERS = 50
+FINE_KNOTS = 31
+
+INCONSISTENCY = "held-out inconsistency"
+OF_WHAT_IS_KNOWN = "held-out error of what is known"
 
 
-class EpisodeFolds:
-    """Deals episodes out to folds: the i-th new episode goes to fold i mod n_folds, and stays there.
+@dataclass(frozen=True)
+class Row:
+    """One candidate's line of the comparison.
 
-    The rule needs no knowledge of what is yet to come, so a stream is dealt out as the whole would be. Samples
-    without episodes are cut into contiguous blocks, since neighbouring samples tell too much about each other.
+    inconsistency: pooled over held-out samples, in squared units of the action; NaN where the candidate failed. With
+        projections given it is `risk.auto`.
+    standard_error: of that, over folds. Candidates share the folds, so differences are surer than it says.
+    explained: share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
+    alpha: λ, as chosen on all the data. n_parameters: of all actions together. seconds: to fit and to hold out.
+    problem: the sentence that says why the candidate could not be fitted, else None.
     """
 
-    def __init__(self, n_folds: int = 5):
-        self.n_folds = n_folds
-        self.fold_of: dict = {}
+    name: str
+    inconsistency: float = np.nan
+    standard_error: float = np.nan
+    explained: float = np.nan
+    alpha: float = np.nan
+    n_parameters: int = 0
+    seconds: float = 0.0
+    problem: str | None = None
 
-    def assign(self, groups: np.ndarray | None, n_samples: int) -> np.ndarray:
-        """The fold of each sample, (N,), for episode labels `groups` (N,), or None."""
-        if groups is None:
-            return np.arange(n_samples) * self.n_folds // n_samples
-        if not n_samples:
-            return np.zeros(0, dtype=int)
-        # An episode's samples mostly follow each other, so only where the label changes is it looked at.
-        starts = np.concatenate([[True], groups[1:] != groups[:-1]])
-        fold_of, deal = self.fold_of, self.n_folds
-        folds = [fold_of.setdefault(name, len(fold_of) % deal) for name in groups[starts].tolist()]
-        return np.repeat(folds, np.diff(np.flatnonzero(np.append(starts, True))))
 
-    def __getstate__(self) -> dict:
-        # An array of labels, in the order they were dealt out, takes a file a thousandth of what a dictionary takes.
-        labels = list(self.fold_of)
-        kinds = {type(label) for label in labels}
-        return {"n_folds": self.n_folds, "labels": np.array(labels) if kinds in ({int}, {str}) else labels}
+@dataclass(frozen=True)
+class Table:
+    """The comparison: rows with the least inconsistent candidate first, and the failed ones last.
 
-    def __setstate__(self, state: dict) -> None:
-        self.n_folds = state["n_folds"]
-        if "fold_of" in state:  # as written by the first release
-            self.fold_of = state["fold_of"]
+    measure: what the candidates are judged by, in words.
+    """
+
+    rows: tuple[Row, ...]
+    measure: str = INCONSISTENCY
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __getitem__(self, name: str) -> Row:
+        """The row of the candidate of that name."""
+        for row in self.rows:
+            if row.name == name:
+                return row
+        raise KeyError(name)
+
+    def __str__(self) -> str:
+        """A Markdown table, its columns aligned."""
+        head = ("candidate", self.measure, "explained", "λ", "parameters", "seconds")
+        lines = [head, *(_cells(row) for row in self.rows if row.problem is None)]
+        widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+        text = [_line([c.ljust(w) for c, w in zip(line, widths, strict=True)]) for line in lines]
+        text.insert(1, _line(["-" * w for w in widths]))
+        failed = [f"{row.name}: {row.problem}" for row in self.rows if row.problem is not None]
+        return "\n".join([*text, *([""] if failed else []), *failed])
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What `select_policy` found: `policy`, fitted to all the data; its `name`; and the comparison, `table`."""
+
+    policy: Policy
+    name: str
+    table: Table
+    policies: dict[str, Policy] = field(repr=False)
+    """All candidates that could be fitted, fitted to all the data, by name."""
+
+    def __str__(self) -> str:
+        return f"{self.table}\n\nchosen: {self.name}"
+
+
+def candidates(n: int, d: int) -> dict[str, Policy]:
+    """The candidates of "auto" for n states and d actions, all with λ by held-out inconsistency.
+
+    Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
+    even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
+    """
+    # Each local model solves for d (n + 1) numbers by itself, which costs their cube.
+    models = np.clip(MOST_PARAMETERS**3 // (d * (n + 1)) ** 3, 1, MOST_CENTERS)
+    centers = np.clip(MOST_PARAMETERS // d, 2, MOST_CENTERS)
+    named: dict[str, Policy] = {
+        "linear": ParametricPolicy(alpha="cv"),
+        "locally linear": LocallyLinearPolicy(n_centers=int(models), alpha="cv"),
+        "RBF": ParametricPolicy(NormalizedRBF(int(centers)), alpha="cv"),
+    }
+    knots = min(7, MOST_PARAMETERS // (n * d) - 2)
+    if knots >= 2:
+        splines = SplineTransformer(n_knots=knots, extrapolation="linear")
+        named["splines"] = ParametricPolicy(splines, alpha="cv")
+    if n == d:
+        named["decoupled"] = ParametricPolicy(DecoupledFeatures(), alpha="cv")
+        if n * FINE_KNOTS <= MOST_PARAMETERS:  # for policies with a corner, such as ∇|x|^1.5
+            named["decoupled, fine"] = ParametricPolicy(DecoupledFeatures(FINE_KNOTS), alpha="cv")
+        named["potential"] = ParametricPolicy(PotentialFeatures(NormalizedRBF(2 * MOST_CENTERS)), alpha="cv")
+    return named
+
+
+def select_policy(
+    candidates: str | Sequence[Policy] | Mapping[str, Policy],
+    X,
+    U,
+    groups=None,
+    *,
+    projections=None,
+    n_jobs: int | None = None,
+    progress: Callable[[Row], None] | None = None,
+) -> Selection:
+    """The candidate with the least inconsistency on held-out episodes, fitted to all the data.
+
+    candidates: policies in a list (each named after itself) or in a dict by name, or "auto" for those that
+        `candidates(n, d)` makes. They are cloned, never changed.
+    X (N, n), U (N, d): states and actions. groups (N,): episodes, which are held out whole; without them contiguous
+        blocks are.
+    projections: N (N, d, d), what is known of the constraints, all NaN where it is not; candidates are then judged by
+        `risk.auto`, and those whose risk is "auto" or "constrained" learn from it.
+    n_jobs: candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
+    progress: called with each candidate's `Row` once it is done, in the order given.
+
+    A candidate that cannot be fitted to these data is listed with the reason. Raises `PolicyError` where none is
+    left or where a candidate is not a policy, and `DataError` for bad arrays, one episode alone, or no motion.
+
+    >>> import numpy as np, unconstrain as uc
+    >>> X = np.random.default_rng(0).normal(size=(200, 2))
+    >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
+    >>> U = np.einsum("nij,nj->ni", N, -np.tanh(X))
+    >>> uc.select_policy("auto", X, U).name
+    'decoupled'
+    """
+    X, _ = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
+    actions, groups = check_actions(U), check_groups(groups, len(X))
+    named = _named(candidates, X.shape[1], actions.shape[1])
+    if projections is not None:
+        projections = check_projections(projections, *actions.shape, unknown=True)
+    # What no candidate could be judged on is told here, as the mistake it is, and not as each one's failure.
+    next(selection.splits(len(X), groups))
+    selection.explained(actions, np.zeros_like(actions))
+
+    parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
+    rows, policies = [], {}
+    judged = parallel(
+        joblib.delayed(_judge)(name, policy, X, U, groups, projections) for name, policy in named.items()
+    )
+    for row, policy in judged:
+        rows.append(row)
+        if policy is not None:
+            policies[row.name] = policy
+        if progress is not None:
+            progress(row)
+    rows.sort(key=lambda row: (row.problem is not None, row.inconsistency))
+    if rows[0].problem is not None:
+        if len({row.problem for row in rows}) == 1:
+            raise PolicyError(rows[0].problem)
+        raise PolicyError(
+            f"none of the candidates could be fitted; the first, {rows[0].name}: {rows[0].problem}"
+        )
+    table = Table(tuple(rows), INCONSISTENCY if projections is None else OF_WHAT_IS_KNOWN)
+    return Selection(policies[rows[0].name], rows[0].name, table, policies)
+
+
+def _named(given, n: int, d: int) -> dict[str, Policy]:
+    if isinstance(given, str):
+        if given != "auto":
+            raise PolicyError(
+                f'candidates must be policies, in a list or a dict by name, or "auto", got {given!r}'
+            )
+        return candidates(n, d)
+    named: dict[str, Policy] = {}
+    for key, policy in given.items() if isinstance(given, Mapping) else ((None, policy) for policy in given):
+        own = " ".join(repr(policy).split()) if key is None else str(key)
+        twins = sum(name == own or name.startswith(f"{own} (") for name in named)
+        named[f"{own} ({twins + 1})" if twins else own] = policy
+    if not named:
+        raise PolicyError("there are no candidates to choose from: give at least one policy")
+    for name, policy in named.items():
+        if not isinstance(policy, Policy):
+            raise PolicyError(
+                f"candidate {name} must be a policy of unconstrain, got {type(policy).__name__}"
+            )
+    return named
+
+
+def _judge(name: str, policy: Policy, X, U, groups, projections) -> tuple[Row, Policy | None]:
+    start = time.perf_counter()
+    try:
+        taken = projections if policy.risk in ("auto", "constrained") else None
+        fitted, predictions, fold = _hold_out(policy, X, U, groups, taken)
+        actions = check_actions(U)
+        seen = sight("auto", actions, projections)
+        errors = squared_errors(seen, predictions)
+        means = np.array([errors[fold == k].mean() for k in np.unique(fold)])
+        row = Row(
+            name,
+            inconsistency=float(errors.mean()),
+            standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
+            explained=1.0 - float(errors.sum() / seen.squares.sum()),
+            alpha=fitted.alpha_,
+            n_parameters=next(part.g.size for part in fitted.moments_ if part is not None),
+            seconds=time.perf_counter() - start,
+        )
+    except ValueError as error:  # ours, and those of transformers from elsewhere
+        sentence = " ".join(str(error).split())
+        return Row(name, seconds=time.perf_counter() - start, problem=sentence), None
+    return row, fitted
+
+
+def _hold_out(policy: Policy, X, U, groups, projections) -> tuple[Policy, np.ndarray, np.ndarray]:
+    """The policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
+    if policy.alpha != "cv":  # `fit` does not get to see it
+        check_number(policy.alpha, "alpha", positive=False)
+    fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)
+    if policy.alpha != "cv":  # the folds are needed all the same, the choice is not
+        fitted = fitted.set_params(alpha=policy.alpha).solved()
+    fold = fitted.folds_.assign(groups, len(X))
+    predictions = np.empty((len(X), fitted.n_actions_))
+    seen = [k for k, part in enumerate(fitted.moments_) if part is not None]
+    for k in np.unique(fold):
+        if policy.alpha == "cv" and len(seen) - (k in seen) < 2:
+            # One fold is left, and λ is chosen within it.
+            train = fold != k
+            several = groups is not None and len(np.unique(groups[train])) > 1
+            left = clone(policy).fit(
+                X[train],
+                np.asarray(U)[train],
+                groups=groups[train] if several else None,
+                projections=None if projections is None else projections[train],
+            )
         else:
-            labels = state["labels"]
-            labels = labels.tolist() if isinstance(labels, np.ndarray) else labels
-            self.fold_of = {label: i % self.n_folds for i, label in enumerate(labels)}
+            left = fitted.solved(without=k)
+        predictions[fold == k] = check_actions(left.predict(X[fold == k]), "predictions")
+    return fitted, predictions, fold
 
 
-def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """The λ with the least risk on folds left out one at a time, or the largest that is as good.
-
-    Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
-    each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added. `scale` is the
-    largest eigenvalue of all folds' H; the candidates are set relative to it.
-
-    Returns λ, the candidates (L,), and their held-out risk per unit of sample weight (L,).
-    Raises `DataError` where fewer than two folds hold data.
-    """
-    folds = [fold for fold in folds if fold.n_samples]
-    if len(folds) < 2:
-        raise DataError(
-            'alpha="cv" needs at least two episodes, or samples without groups, to hold some out: '
-            "give a number for alpha, or no groups"
-        )
-    alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS) * (scale or 1.0)
-    error = np.zeros(N_ALPHAS)
-    for i, held_out in enumerate(folds):
-        train = Moments.sum(folds[:i] + folds[i + 1 :])
-        candidates = train.decompose().solve(alphas)
-        error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
-    error /= sum(float(fold.weight.sum()) for fold in folds)
-    as_good = error <= (1 + INDISTINGUISHABLE) * error.min()
-    return float(alphas[as_good].max()), alphas, error
+def _cells(row: Row) -> tuple[str, ...]:
+    return (
+        row.name,
+        f"{row.inconsistency:.4g} ± {row.standard_error:.1g}",
+        f"{row.explained:.6f}",
+        f"{row.alpha:.2g}",
+        str(row.n_parameters),
+        f"{row.seconds:.2f}",
+    )
 
 
-def splits(n_samples: int, groups=None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows to train on and rows to test on, a pair a fold, dealt out as `EpisodeFolds` does.
-
-    groups: episode labels (N,), or None. Raises `DataError` where there is one fold only.
-    """
-    fold = EpisodeFolds().assign(None if groups is None else np.asarray(groups), n_samples)
-    present = np.unique(fold)
-    if len(present) < 2:
-        raise DataError(
-            "cross-validation needs at least two episodes, or samples without groups, to hold some out"
-        )
-    for k in present:
-        yield np.flatnonzero(fold != k), np.flatnonzero(fold == k)
-
-
-def explained(U, P) -> float:
-    """Share of observed motion explained, `1 - Σ (r - û·p)² / Σ r²`, of actions U (N, d) by predictions P (N, d).
-
-    1 for a policy consistent with every sample, 0 for one that says "do not move", negative for worse than that.
-    Raises `DataError` where nothing moves.
-    """
-    motion = float(np.mean(np.sum(np.square(U), axis=-1)))
-    if motion == 0.0:
-        raise DataError("all actions are zero: there is no motion to explain")
-    return 1.0 - risk.inconsistency(U, P) / motion
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"

@@ -13,9 +13,7 @@ from unconstrain.cli.demo import demo
 from unconstrain.cli.diagnose import diagnose
 from unconstrain.cli.evaluate import evaluate
 from unconstrain.cli.fit import fit
-from unconstrain.cli.reproduce import reproduce
 from unconstrain.cli.rollout import rollout
-from unconstrain.cli.view import view
 from unconstrain.errors import UnconstrainError
 
 app = typer.Typer(
@@ -42,7 +40,7 @@ def program(
     """Learn the policy behind constrained demonstrations."""
 
 
-for command in (demo, fit, evaluate, diagnose, constraints, rollout, reproduce, view):
+for command in (demo, fit, evaluate, diagnose, constraints, rollout):
     app.command()(command)
 
 

@@ -7,14 +7,16 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from unconstrain import constraint_figures, figures, risk
+from unconstrain import metrics as risk
+from unconstrain.arrays import check_choice
 from unconstrain.cli import recordings, reporting
+from unconstrain.constraints.learnt import ConstantConstraint, FeatureConstraint
+from unconstrain.constraints.learnt.base import LearntConstraint, held_out_projections
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import NormalizedRBF
-from unconstrain.learnt_constraints import ConstantConstraint, FeatureConstraint
-from unconstrain.learnt_constraints.base import LearntConstraint, held_out_projections
-from unconstrain.validation import check_choice
+from unconstrain.plot import constraint as constraint_figures
+from unconstrain.plot import policy as figures
 
 MODELS = ("constant", "linear", "rbf")
 

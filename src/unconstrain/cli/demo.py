@@ -10,12 +10,14 @@ import pyarrow.csv
 import typer
 from rich.table import Table
 
-from unconstrain import atomic, figures, selection
+from reproduction import toy
+from unconstrain import atomic
 from unconstrain.cli import reporting
 from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
-from unconstrain.experiments import toy
+from unconstrain.fitting import solve as selection
+from unconstrain.plot import policy as figures
 
 ROWS = {
     "inconsistency": "the policy behind them (inconsistency)",

@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from unconstrain import figures
+from unconstrain.arrays import check_choice
 from unconstrain.cli import models, recordings, reporting
+from unconstrain.diagnostics import identifiability
+from unconstrain.diagnostics.spectrum import THRESHOLD
 from unconstrain.errors import PolicyError
-from unconstrain.identifiability import identifiability
-from unconstrain.identifiability.pictures import drawn
-from unconstrain.identifiability.spectrum import THRESHOLD
-from unconstrain.validation import check_choice
+from unconstrain.plot import policy as figures
+from unconstrain.plot.diagnostics import drawn
 
 CHOICES = tuple(name for name in models.MODELS if name != "auto")
 

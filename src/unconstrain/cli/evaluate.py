@@ -7,9 +7,10 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from unconstrain import risk, selection
+from unconstrain import metrics as risk
 from unconstrain.cli import recordings, reporting
 from unconstrain.errors import DataError
+from unconstrain.fitting import solve as selection
 from unconstrain.policies import load_policy
 
 

@@ -9,16 +9,17 @@ from rich.console import Console
 from rich.table import Table
 from sklearn.base import clone
 
-from unconstrain import comparison, figures
+from unconstrain import selection as comparison
+from unconstrain.arrays import check_choice
 from unconstrain.cli import models, recordings, reporting, streams
 from unconstrain.cli.reporting import quoted
 from unconstrain.constraints import from_recording
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.diagnostics import identifiability
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.identifiability import identifiability
+from unconstrain.fitting.observation import unknown
+from unconstrain.plot import policy as figures
 from unconstrain.policies.base import Policy
-from unconstrain.sight import unknown
-from unconstrain.validation import check_choice
 
 WORTH_A_WARNING = 0.1
 """Share of the policy that recordings leave undetermined."""

@@ -4,11 +4,11 @@ from typing import Annotated, Any
 
 import typer
 
+from unconstrain.arrays import check_number
 from unconstrain.errors import PolicyError
 from unconstrain.features import NormalizedRBF
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
-from unconstrain.validation import check_number
 
 MODELS = ("linear", "rbf", "locally-linear", "auto")
 

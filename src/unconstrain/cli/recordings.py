@@ -10,11 +10,11 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from unconstrain.arrays import check_choice
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.readers import load
-from unconstrain.readers.roles import DIFFERENTIATE
-from unconstrain.validation import check_choice
+from unconstrain.recordings import load
+from unconstrain.recordings.roles import DIFFERENTIATE
 
 Files = Annotated[
     list[str],

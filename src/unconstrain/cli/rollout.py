@@ -9,13 +9,14 @@ import pyarrow.csv
 import typer
 from matplotlib.figure import Figure
 
-from unconstrain import atomic, figures
+from unconstrain import atomic
 from unconstrain.cli import recordings, reporting
 from unconstrain.errors import DataError
+from unconstrain.fitting.posterior import Unsure
+from unconstrain.plot import policy as figures
 from unconstrain.policies import load_policy
-from unconstrain.rollout import Rollout
-from unconstrain.rollout import rollout as integrate
-from unconstrain.uncertainty import Unsure
+from unconstrain.simulation import Rollout
+from unconstrain.simulation import rollout as integrate
 
 
 def rollout(

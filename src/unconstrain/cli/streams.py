@@ -6,12 +6,12 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from unconstrain import distributed
 from unconstrain.cli import reporting
 from unconstrain.errors import PolicyError
-from unconstrain.moments import Moments
+from unconstrain.fitting.moments import Moments
 from unconstrain.policies.base import Policy
-from unconstrain.stream import fit_stream
+from unconstrain.scaling import cluster as distributed
+from unconstrain.scaling.stream import fit_stream
 
 Checkpoint = Annotated[
     Path | None,

@@ -10,7 +10,7 @@ constraints in the actions.
 """
 
 from unconstrain.constraints.forces import contact, from_forces
-from unconstrain.constraints.known import first_known, from_flags, from_jacobian, from_normals
+from unconstrain.constraints.measured import first_known, from_flags, from_jacobian, from_normals
 from unconstrain.constraints.nullspace import (
     NEGLIGIBLE_ROW,
     RANK_TOLERANCE,

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from unconstrain.constraints.known import checked_jacobians, from_normals
+from unconstrain.constraints.measured import checked_jacobians, from_normals
 from unconstrain.errors import DataError
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.constraints.forces import from_forces
-from unconstrain.constraints.known import first_known, from_flags
+from unconstrain.constraints.measured import first_known, from_flags
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from sklearn.cluster import KMeans
 
+from unconstrain.arrays import check_choice, check_finite
 from unconstrain.errors import PolicyError
-from unconstrain.validation import check_choice, check_finite
 
 PLACEMENTS = ("grid", "kmeans", "coverage")
 

@@ -17,9 +17,9 @@ from numpy.polynomial.legendre import legvander
 from sklearn.base import BaseEstimator
 from sklearn.preprocessing import SplineTransformer
 
+from unconstrain.arrays import check_choice
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import check_square
-from unconstrain.validation import check_choice
 
 EXTRAPOLATIONS = ("linear", "constant", "continue")
 
@@ -48,7 +48,7 @@ class DecoupledFeatures(BaseEstimator):
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(500, 1, 3)))
     >>> U = np.einsum("nij,nj->ni", N, -np.sin(3 * X))
     >>> policy = uc.ParametricPolicy(uc.DecoupledFeatures(), alpha="cv").fit(X, U)
-    >>> bool(uc.risk.unconstrained_policy_error(-np.sin(3 * X), policy.predict(X)) < 1e-6)
+    >>> bool(uc.metrics.unconstrained_policy_error(-np.sin(3 * X), policy.predict(X)) < 1e-6)
     True
     """
 

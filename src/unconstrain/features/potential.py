@@ -31,7 +31,7 @@ class PotentialFeatures(BaseEstimator):
     >>> Pi = -X * np.exp(-np.sum(X**2, axis=1, keepdims=True))
     >>> U = np.einsum("nij,nj->ni", N, Pi)
     >>> policy = uc.ParametricPolicy(uc.PotentialFeatures(), alpha="cv").fit(X, U)
-    >>> bool(uc.risk.unconstrained_policy_error(Pi, policy.predict(X)) < 1e-4)
+    >>> bool(uc.metrics.unconstrained_policy_error(Pi, policy.predict(X)) < 1e-4)
     True
     """
 

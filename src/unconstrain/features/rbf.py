@@ -4,8 +4,8 @@ import numpy as np
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
+from unconstrain.arrays import check_number, check_states, check_weights
 from unconstrain.features.centers import normalized_activations, place
-from unconstrain.validation import check_number, check_states, check_weights
 
 
 class NormalizedRBF(TransformerMixin, BaseEstimator):

@@ -1,6 +1,6 @@
 """Policies as scikit-learn estimators."""
 
-from unconstrain.policies.compiled import CompiledPolicy, load_compiled
+from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.policies.persistence import load_policy

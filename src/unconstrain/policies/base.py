@@ -9,15 +9,7 @@ import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain import selection
-from unconstrain.errors import DataError, PolicyError
-from unconstrain.moments import Moments
-from unconstrain.policies import compilation, onnx, persistence
-from unconstrain.policies.compiled import CompiledPolicy
-from unconstrain.policies.tally import Tally
-from unconstrain.sight import NO_MOTION, RISKS, Sight, informative, lengths, moving, sight, unknown
-from unconstrain.uncertainty import Posterior
-from unconstrain.validation import (
+from unconstrain.arrays import (
     check_actions,
     check_choice,
     check_groups,
@@ -27,6 +19,24 @@ from unconstrain.validation import (
     check_states,
     check_weights,
 )
+from unconstrain.deploy import compilation, onnx
+from unconstrain.deploy.compiled import CompiledPolicy
+from unconstrain.errors import DataError, PolicyError
+from unconstrain.fitting import solve as selection
+from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.observation import (
+    NO_MOTION,
+    RISKS,
+    Sight,
+    informative,
+    lengths,
+    moving,
+    sight,
+    unknown,
+)
+from unconstrain.fitting.posterior import Posterior
+from unconstrain.fitting.tally import Tally
+from unconstrain.policies import persistence
 
 NO_DIRECTION = (
     "all actions are zero, and a zero action has no direction to learn from: check the action columns, "

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from unconstrain.accumulation import local_moments
+from unconstrain.arrays import check_number
 from unconstrain.features.centers import normalized_activations, place
-from unconstrain.moments import Moments
+from unconstrain.fitting.accumulate import local_moments
+from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.observation import Sight
+from unconstrain.fitting.posterior import Posterior, local_covariance
 from unconstrain.policies.base import Policy
-from unconstrain.sight import Sight
-from unconstrain.uncertainty import Posterior, local_covariance
-from unconstrain.validation import check_number
 
 BLOCK_ROWS = 4096
 

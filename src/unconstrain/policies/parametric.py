@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from unconstrain.accumulation import parametric_moments
 from unconstrain.features.full import as_policy_features
-from unconstrain.moments import Moments
+from unconstrain.fitting.accumulate import parametric_moments
+from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.observation import Sight
+from unconstrain.fitting.posterior import Posterior, parametric_covariance
 from unconstrain.policies.base import Policy
-from unconstrain.sight import Sight
-from unconstrain.uncertainty import Posterior, parametric_covariance
 
 
 class ParametricPolicy(Policy):
@@ -31,7 +31,7 @@ class ParametricPolicy(Policy):
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
     >>> U = np.einsum("nij,nj->ni", N, Pi)                        # what is recorded
     >>> policy = uc.ParametricPolicy().fit(X, U)
-    >>> bool(uc.risk.unconstrained_policy_error(Pi, policy.predict(X)) < 1e-9)
+    >>> bool(uc.metrics.unconstrained_policy_error(Pi, policy.predict(X)) < 1e-9)
     True
     """
 

@@ -1,0 +1,49 @@
+"""Bounds from the other side: how large the unconstrained error can be, given the inconsistency.
+
+Assume that the true policy is in the model's span, `π = Φ w*`, and that actions were recorded without noise, so that
+`r = ûᵀΦ w*`. With `δ = w - w*` and sums over the data's states (everything here is divided by their weight),
+
+    E_i(w) = δᵀHδ = Σ_k λ_k a_k²,     UPE(w) = δᵀGδ = Σ_k a_k²,     δ = Σ_k a_k z_k + (what G does not see)
+
+in the generalised eigenvectors of (H, G). Hence, for any w whatever,
+
+    UPE <= E_i / λ_min,     a_k² <= E_i / λ_k,     Σ_{λ_k >= τ} a_k² <= E_i / min{λ_k : λ_k >= τ}.
+
+The last is the share of the error in the directions that are determined; of the others the data say nothing. With
+noise, or a policy outside the span, `√E_i(w)` in these is replaced by `√E_i(w) + √E_i(w*)` (triangle inequality).
+
+Local models are fitted alone: each has a bound of its own, on its states weighted by its receptive field K_m. The
+blend's error is at most the blend of errors (‖·‖² is convex) and a blending weight at most `K_m / κ`, with κ the least
+sum of activations at any of the states, so that `UPE <= 1/(Nκ) Σ_m E_m / λ_m`. The span of local models that are each
+right is that of linear policies: for others this bounds the distance to the best of them only as far as they fit.
+"""
+
+import numpy as np
+
+from unconstrain.diagnostics.spectrum import THRESHOLD
+
+
+def bounds(
+    risks: np.ndarray, seen: list[np.ndarray], weight: float, threshold: float = THRESHOLD
+) -> tuple[float, float]:
+    """Bounds of UPE, on all directions and on those determined, in squared units of the action, a mean over states.
+
+    risks: E_i of each model, (S,), summed over samples. seen: λ of each, ascending. weight: what to divide by.
+    """
+    everywhere = determined = 0.0
+    for error, values in zip(risks, seen, strict=True):
+        if not len(values):
+            continue
+        everywhere += error / values[0] if values[0] > 0 else np.inf
+        known = values[values >= threshold]
+        determined += error / known[0] if len(known) else 0.0
+    return everywhere / weight, determined / weight
+
+
+def per_direction(risks: np.ndarray, seen: list[np.ndarray], weights: np.ndarray) -> list[np.ndarray]:
+    """Bounds `E_i / λ_k` of the mean squared error along each direction, a list of arrays (R,); inf where λ is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return [
+            np.where(values > 0, error / values, np.inf) / weight
+            for error, values, weight in zip(risks, seen, weights, strict=True)
+        ]

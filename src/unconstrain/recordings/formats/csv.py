@@ -1,0 +1,160 @@
+"""Text tables: CSV, TSV and the like, with or without a header."""
+
+import csv
+import re
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
+
+from unconstrain.errors import DataError
+from unconstrain.recordings.table import Column, Table
+
+BOM = b"\xef\xbb\xbf"
+NUMBER = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity))\s*", re.IGNORECASE)
+DECIMAL_COMMA = r"^\s*([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)\s*$"
+PROBED = 20  # lines looked at to find the delimiter
+
+
+def read(path: Path, shown: str) -> Table:
+    """All columns as text; they become numbers only where they are used, so other columns may hold anything.
+
+    Found by itself: the delimiter (tab, semicolon, comma, or spaces), a decimal comma where that is not
+    the delimiter, a header, a byte-order mark. Left out: empty lines, and lines that start with `#`;
+    the last of these before the data is the header if it names every column, as NumPy's `savetxt` writes.
+
+    Raises
+    ------
+    DataError
+        The file is empty, not UTF-8 text, has only a header, or lines of different lengths.
+    """
+    data = path.read_bytes()
+    _check_text(data, shown)
+    lines = [line for _, line in _content(data)]
+    if not lines:
+        raise DataError(f"{shown} is empty: there is nothing to read")
+    probe = [line.decode() for line in lines[:PROBED]]
+    try:
+        delimiter = _delimiter(probe)
+        if delimiter == " ":
+            lines = [b" ".join(line.split()) for line in lines]
+            probe = [" ".join(line.split()) for line in probe]
+        cells = list(csv.reader(probe, delimiter=delimiter))
+    except csv.Error as error:
+        raise DataError(f"{shown} cannot be read as a text table ({error})") from error
+    width = len(cells[0])
+    headed = _is_header(cells)
+    if len(lines) == headed:
+        raise DataError(f"{shown} has a header but no samples")
+    if headed:
+        names = [name.strip() for name in cells[0]]
+    else:
+        names = _header_in_comment(data, delimiter, width) or [""] * width
+
+    unique = [str(i) for i in range(width)]  # names may repeat, positions do not
+    try:
+        table = pyarrow.csv.read_csv(
+            pa.BufferReader(b"\n".join(lines[headed:])),
+            read_options=pyarrow.csv.ReadOptions(column_names=unique, block_size=1 << 24),
+            parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),
+            convert_options=pyarrow.csv.ConvertOptions(column_types={name: pa.string() for name in unique}),
+        )
+    except pa.ArrowInvalid as error:
+        raise _ragged(data, delimiter, width, shown, error) from error
+    columns = [column.combine_chunks() for column in table.columns]
+    if delimiter in "\t;":
+        columns = [pc.replace_substring_regex(column, DECIMAL_COMMA, r"\1.\2") for column in columns]
+    named = [Column(name, values) for name, values in zip(names, columns, strict=True)]
+    return Table(shown, named, _place(path, headed))
+
+
+def _check_text(data: bytes, shown: str) -> None:
+    if b"\0" in data[: 1 << 16]:
+        raise DataError(f"{shown} is not a text table: save it as UTF-8 text, or correct its suffix")
+    try:
+        data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise DataError(f"{shown} is not UTF-8 text at line {line}: save it as UTF-8") from error
+
+
+def _lines(data: bytes) -> list[bytes]:
+    return data.removeprefix(BOM).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+
+
+def _content(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """The lines that say something, with their number in the file, counted from 1."""
+    # Tabs are not stripped: a line of them is a row of empty cells, which must not go unnoticed.
+    return (
+        (number, line)
+        for number, line in enumerate(_lines(data), start=1)
+        if line.strip(b" ") and not line.lstrip().startswith(b"#")
+    )
+
+
+def _place(path: Path, headed: bool) -> Callable[[int], str]:
+    def place(index: int) -> str:
+        # Read again, because only a mistake asks for this.
+        number, _ = next(islice(_content(path.read_bytes()), index + headed, None))
+        return f"line {number}"
+
+    return place
+
+
+def _delimiter(probe: list[str]) -> str:
+    # Comma comes last, as it may be the decimal mark of a table delimited otherwise.
+    counts = {mark: [len(next(csv.reader([line], delimiter=mark))) for line in probe] for mark in "\t;,"}
+    for mark, count in counts.items():
+        if min(count) == max(count) > 1:
+            return mark
+    if any(max(count) > 1 for count in counts.values()):
+        return max(counts, key=lambda mark: sum(counts[mark]))
+    if len(probe[-1].split()) > 1 and all(NUMBER.fullmatch(cell) for cell in probe[-1].split()):
+        return " "
+    return ","
+
+
+def _is_header(cells: list[list[str]]) -> bool:
+    first = [cell.strip() for cell in cells[0]]
+    numeric = [cell for cell in first if _is_number(cell)]
+    if not numeric:
+        return True
+    # Unnamed columns are written by pandas as 0, 1, 2, ..., and its index as an empty name before them.
+    numbered = numeric in ([str(i) for i in range(len(numeric))], [str(i + 1) for i in range(len(numeric))])
+    return numbered and len(numeric) < len(first) and len(cells) > 1 and all(map(_is_number, cells[1]))
+
+
+def _is_number(cell: str) -> bool:
+    return NUMBER.fullmatch(cell.replace(",", ".")) is not None
+
+
+def _header_in_comment(data: bytes, delimiter: str, width: int) -> list[str] | None:
+    header = b""
+    for line in _lines(data):
+        if line.lstrip().startswith(b"#"):
+            header = line
+        elif line.strip():
+            break
+    text = header.decode().lstrip(" #")
+    names = text.split() if delimiter == " " else [name.strip() for name in text.split(delimiter)]
+    return names if len(names) == width > 1 and not any(map(_is_number, names)) else None
+
+
+def _ragged(data: bytes, delimiter: str, width: int, shown: str, error: Exception) -> DataError:
+    for number, line in _content(data):
+        text = line.decode()
+        try:
+            count = len(text.split() if delimiter == " " else next(csv.reader([text], delimiter=delimiter)))
+        except csv.Error:
+            break
+        if count != width:
+            return DataError(
+                f"{shown}: line {number} has {count} {'cell' if count == 1 else 'cells'} "
+                f"where the first line has {width}; "
+                "every line must have as many"
+            )
+    reason = str(error).splitlines()[0]
+    return DataError(f"{shown} cannot be read as a text table ({reason})")

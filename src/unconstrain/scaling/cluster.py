@@ -1,0 +1,271 @@
+"""The pass over a stream on a Dask cluster: workers turn parts of the data into moments, and only these travel.
+
+A part is a run of row groups (of whole episodes, where states are differentiated or forces filtered). Its moments are
+P² + P numbers a fold, whatever its size; pairs of neighbours are added until one is left, on the workers. Which fold an
+episode belongs to is decided before, by a pass over the episode column alone, so that it is the fold `fit_stream` puts
+it in.
+"""
+
+import logging
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.fitting.tally import Tally
+from unconstrain.policies.base import Policy
+from unconstrain.progress import Report, reporting
+from unconstrain.recordings.dataset import Dataset
+from unconstrain.recordings.reading import Reading
+from unconstrain.recordings.roles import Keys
+from unconstrain.recordings.table import Key
+from unconstrain.scaling.stream import (
+    BATCH_ROWS,
+    SAMPLE_ROWS,
+    begin,
+    finish,
+    fold_of_samples,
+    prepared,
+    tally_of,
+)
+
+PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows `start` to `stop`, and the folds of the episodes in them; None where episodes are dealt out on the spot."""
+
+    start: int
+    stop: int
+    fold_of: dict[Any, int] | None
+
+
+@dataclass(frozen=True)
+class Sum:
+    """What consecutive parts add, and how many episodes were dealt out on the spot while adding them up."""
+
+    tally: Tally
+    n_dealt: int = 0
+
+
+def fit(
+    policy: Policy,
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    client: Any,
+    *,
+    state: Keys | None = None,
+    action: Keys | None = None,
+    episode: Key | None = None,
+    time: Key | None = None,
+    projections: Keys | None = None,
+    force: Keys | None = None,
+    force_threshold: float | None = None,
+    free: Key | None = None,
+    time_unit: str | None = None,
+    window: float = 0.2,
+    gap: float | None = None,
+    max_speed: float | None = None,
+    min_duration: float | None = None,
+    partial: bool = False,
+    progress: bool | Report | None = None,
+    batch_rows: int = BATCH_ROWS,
+    sample_rows: int = SAMPLE_ROWS,
+    part_rows: int | None = None,
+    random_state: int | None = 0,
+):
+    """Fit a policy to files that the workers of a Dask cluster read. Returns the policy, fitted.
+
+    The result is that of `fit_stream`, to rounding, however the data are divided and whoever computes what. The
+    work of a worker that is lost is done again by others.
+
+    client: a `distributed.Client`; see `connected`. The files must be visible to the workers and to this process,
+        under the same paths.
+    part_rows: how many rows, at least, a task adds up; by default as many as make four tasks a thread.
+
+    All else as for `fit_stream`. Raises what it raises, and `UnconstrainError` where the cluster fails.
+    """
+    reading = Reading(
+        state=state, action=action, episode=episode, time=time, projections=projections, force=force,
+        force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
+        min_duration=min_duration,
+    )  # fmt: skip
+    work, opened = prepared(policy, source, reading, batch_rows, partial=partial)
+    if not isinstance(opened, Dataset):
+        raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
+    longest = begin(work, opened, sample_rows, random_state, partial=partial)
+    threads = max(sum(client.nthreads().values()), 1)
+    rows = part_rows or max(batch_rows, -(-opened.n_rows // (PARTS_PER_THREAD * threads)))
+    parts = list(divided(opened, rows, work.folds_ if work.alpha == "cv" else None))
+    with reporting(progress) as report:
+        total = _added_up(client, work, opened, parts, longest, report)
+        if total.tally.misjudged:
+            total = _added_up(client, work, opened, parts, total.tally.longest, report)
+    tally = total.tally
+    if total.n_dealt:
+        known = len(work.folds_.fold_of)
+        tally = tally.dealt_from(known % work.folds_.n_folds, work.folds_.n_folds)
+        work.folds_.assign(np.array([f"derived {known + i}" for i in range(total.n_dealt)]), total.n_dealt)
+    return finish(policy, work, tally)
+
+
+@contextmanager
+def connected(cluster: str, timeout: float = 10.0) -> Iterator[Any]:
+    """A client of the scheduler at an address such as `tcp://host:8786`, or of a cluster of this machine, "local".
+
+    timeout: seconds in which the scheduler must answer.
+    Raises `UnconstrainError` where Dask is not installed, no scheduler answers, or no workers can be started.
+    """
+    try:
+        import distributed
+    except ImportError as error:
+        raise UnconstrainError(
+            "a cluster needs Dask, which is not installed: pip install 'unconstrain[distributed]'"
+        ) from error
+    if cluster == "local":
+        try:  # what goes wrong with a part is raised here, so workers need not log it as well
+            local = distributed.LocalCluster(
+                threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
+            )
+        except RuntimeError as error:
+            raise UnconstrainError(
+                "no worker processes could be started on this machine: in a script, call this below "
+                'if __name__ == "__main__":, as each of them imports the script'
+            ) from error
+        with local, distributed.Client(local) as client:
+            yield client
+        return
+    try:
+        client = distributed.Client(cluster, timeout=timeout)
+    except (OSError, ValueError, TypeError) as error:
+        raise UnconstrainError(
+            f"no Dask scheduler answers at {cluster}: check the address, which looks like tcp://host:8786"
+        ) from error
+    with client:
+        yield client
+
+
+def divided(source: Dataset, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
+    """The parts of a source, of `rows` rows or more, with the folds of their episodes, which are dealt out here."""
+    if source.needs_whole_episodes:
+        bounds = list(_episode_starts(source, rows))
+        for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):
+            # Fragments of episodes that are differentiated are known, and dealt out, only once they are.
+            dealt = None if folds is None or source.differentiates else _folds_of(source, start, stop, folds)
+            yield Part(start, stop, dealt)
+        return
+    ends = np.cumsum([size for file in source.shards.row_groups for size in file])
+    start = 0
+    for end in (int(end) for end in ends):
+        # Row groups are decoded as a whole, so parts end with one, unless one alone is many parts long.
+        cuts = [start + rows * i for i in range(1, (end - start) // rows)] if end - start >= 2 * rows else []
+        if end - start >= rows or end == source.n_rows:
+            for stop in (*cuts, end):
+                if stop > start:
+                    yield Part(start, stop, None if folds is None else _folds_of(source, start, stop, folds))
+                    start = stop
+
+
+def _folds_of(source: Dataset, start: int, stop: int, folds: EpisodeFolds) -> dict[Any, int]:
+    own: dict[Any, int] = {}
+    for labels, _ in source.labels(start, stop):
+        fold = folds.assign(labels, len(labels))
+        firsts = np.concatenate([[True], labels[1:] != labels[:-1]])
+        own.update(zip(labels[firsts].tolist(), fold[firsts].tolist(), strict=True))
+    return own
+
+
+def _episode_starts(source: Dataset, rows: int) -> Iterator[int]:
+    """Where parts of whole episodes begin; the episodes in between have `rows` rows or more."""
+    yield 0
+    current: Any = None
+    ended: set[Any] = set()
+    last = 0
+    for labels, start in source.labels(0, source.n_rows, whole=True):
+        firsts = np.flatnonzero(np.concatenate([[labels[0] != current], labels[1:] != labels[:-1]]))
+        for at in firsts.tolist():
+            if labels[at] in ended:
+                raise DataError(
+                    f"{source.shards.shown}: episode {labels[at]} goes on at row {start + at} (counted from 0 over all "
+                    f"files) after another began; to {source.needs_whole_episodes} the data, sort them by episode"
+                )
+            if current is not None:
+                ended.add(current)
+            current = labels[at]
+            if start + at - last >= rows:
+                last = start + at
+                yield last
+
+
+def _added_up(
+    client: Any, work: Policy, source: Dataset, parts: list[Part], longest: float, report: Report
+) -> Sum:
+    import distributed
+
+    sent = copy(work)
+    sent.moments_ = []
+    if work.alpha == "cv":
+        sent.folds_ = EpisodeFolds(work.folds_.n_folds)
+    shards = replace(source.shards, threads=False)  # the cluster's tasks are its threads
+    # A task, not scattered data: what a lost worker held of it can then be made again.
+    setup = client.submit(_setup, sent, replace(source, shards=shards), longest, pure=False)
+    level = [client.submit(_sum_of_part, setup, part, pure=False) for part in parts]
+    rows = {future.key: part.stop - part.start for future, part in zip(level, parts, strict=True)}
+    finished = distributed.as_completed(level)
+    while len(level) > 1:
+        pairs = [
+            client.submit(_sum_of_two, a, b, pure=False)
+            for a, b in zip(level[::2], level[1::2], strict=False)
+        ]
+        level = pairs + level[len(level) - len(level) % 2 :]
+    (total,) = level
+    done = 0
+    report(0, source.n_rows)
+    try:
+        for future in finished:
+            if future.status == "error":
+                break
+            done += rows[future.key]
+            if future is not total:
+                future.release()
+            report(done, source.n_rows)
+        return total.result()
+    except distributed.KilledWorker as error:
+        raise UnconstrainError(
+            "the cluster gave up on a part after several workers died on it, mostly for want of memory: give the "
+            "workers more, or learn with fewer features or smaller batch_rows"
+        ) from error
+    finally:
+        client.cancel([total, *finished.futures])
+
+
+def _setup(policy: Policy, source: Dataset, longest: float) -> tuple[Policy, Dataset, float]:
+    return policy, source, longest
+
+
+def _sum_of_part(setup: tuple[Policy, Dataset, float], part: Part) -> Sum:
+    given, source, longest = setup
+    policy = copy(given)  # tasks of one worker share what was sent
+    if policy.alpha == "cv":
+        policy.folds_ = EpisodeFolds(given.folds_.n_folds)
+        policy.folds_.fold_of = dict(part.fold_of or {})
+    known = len(part.fold_of or {})
+    total = Tally()
+    with threadpool_limits(1, user_api="blas"):
+        for block in source.blocks(part.start, part.stop):
+            samples = block.load()
+            fold = fold_of_samples(policy, samples)
+            total += tally_of(policy, samples, fold, longest)
+    return Sum(total, len(policy.folds_.fold_of) - known if policy.alpha == "cv" else 0)
+
+
+def _sum_of_two(a: Sum, b: Sum) -> Sum:
+    tally = b.tally.dealt_from(a.n_dealt, EpisodeFolds().n_folds) if a.n_dealt else b.tally
+    return Sum(a.tally + tally, a.n_dealt + b.n_dealt)

@@ -1,0 +1,293 @@
+"""Learnt constraints: exact where the model holds the truth, and honest where there is none to be found."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+from sklearn.base import clone
+
+import unconstrain as uc
+from reproduction import constraints, constraints_surfaces, constraints_trials
+from reproduction.plants import arm
+from reproduction.plants.planar import PlanarArm
+from unconstrain.constraints.learnt.base import held_out_projections
+
+RECORDINGS = Path(__file__).parents[2] / "../shared/data"
+
+
+def constrained(A, Pi):
+    N = uc.constraints.projection(A)
+    return N, np.einsum("nij,nj->ni", N, Pi)
+
+
+def nppe(Pi, N, learnt):
+    return uc.metrics.normalized(uc.metrics.projected_policy_error(Pi, N, learnt), Pi)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 7), st.data())
+def test_any_constant_constraint_is_found_exactly_with_its_number_of_rows(seed, d, data):
+    k = data.draw(st.integers(1, d - 1))
+    rng = np.random.default_rng(seed)
+    X, Pi = rng.normal(size=(200, 2)), rng.normal(size=(200, d))
+    N, U = constrained(np.broadcast_to(rng.normal(size=(k, d)), (200, k, d)), Pi)
+    found = uc.ConstantConstraint().fit(X, U)
+    assert found.n_constraints_ == k
+    np.testing.assert_allclose(found.predict(X), N, atol=1e-10)
+    np.testing.assert_allclose(found.rows_ @ found.rows_.T, np.eye(k), atol=1e-12)
+    assert found.uncertainty_ < 1e-6
+    assert found.score(X, U) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_noise_tilts_a_constant_constraint_no_further_than_it_says():
+    rng = np.random.default_rng(0)
+    off = []
+    for _ in range(30):
+        normal = rng.normal(size=3)
+        _, U = constrained(np.broadcast_to(normal, (300, 1, 3)), rng.normal(size=(300, 3)))
+        found = uc.ConstantConstraint().fit(U, U + 0.2 * rng.normal(size=U.shape))
+        assert found.n_constraints_ == 1
+        sine = np.linalg.norm(np.cross(found.rows_[0], normal / np.linalg.norm(normal)))
+        off.append(np.arcsin(min(sine, 1.0)) / found.uncertainty_)
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5  # the angle in standard errors
+
+
+@pytest.mark.parametrize("a", [0.1, 0.5, 2.0])
+def test_parabolic_constraints_are_found_exactly(a):
+    rng = np.random.default_rng(1)
+    X = rng.uniform(-1, 1, (300, 2))
+    Pi = -X @ [[1.0, 0.3], [-0.4, 1.0]] + [0.5, -0.3]
+    N, U = constrained(np.stack([-2 * a * X[:, 0], np.ones(300)], axis=1)[:, None], Pi)
+    assert nppe(Pi, N, uc.FeatureConstraint().fit(X, U).predict(X)) < 1e-24
+    # Many lengths of the row fit alike with RBFs; the one chosen has a direction everywhere.
+    assert nppe(Pi, N, uc.FeatureConstraint(uc.NormalizedRBF(9)).fit(X, U).predict(X)) < 1e-4
+
+
+@pytest.mark.parametrize(("kind", "held"), [("1-2-3", [0, 1, 2]), ("2-4-6", [1, 3, 5])])
+def test_the_arms_fixed_task_rows_are_named(kind, held):
+    demos = arm.demonstrate(kind, n_episodes=10, length=30, random_state=0)
+    found = uc.FeatureConstraint(arm.jacobian, n_constraints=None)
+    found.fit(demos.states, demos.actions, groups=demos.episodes)
+    assert found.n_constraints_ == 3
+    np.testing.assert_allclose(found.constrained_features_, np.isin(np.arange(6), held), atol=1e-9)
+    unseen = arm.demonstrate(kind, n_episodes=5, length=10, random_state=1)
+    assert nppe(unseen.policy, unseen.projections, found.predict(unseen.states)) < 1e-24
+    rows = found.rows(unseen.states)
+    np.testing.assert_allclose(rows @ rows.swapaxes(1, 2), np.broadcast_to(np.eye(3), (50, 3, 3)), atol=1e-12)
+
+
+def test_two_state_dependent_rows_by_deflation_through_noise():
+    rng = np.random.default_rng(2)
+    X = rng.uniform(-1, 1, (800, 2))
+    A = np.zeros((800, 2, 4))
+    A[:, 0] = np.column_stack([np.ones(800), X[:, 0], np.zeros((800, 2))])
+    A[:, 1] = np.column_stack([np.zeros((800, 2)), X[:, 1], np.ones(800)])
+    Pi = rng.normal(size=(800, 4))
+    N, U = constrained(A, Pi)
+    for noise, limit in ((0.0, 1e-20), (0.05, 1e-3)):
+        found = uc.FeatureConstraint(n_constraints=None).fit(X, U + noise * rng.normal(size=U.shape))
+        assert found.n_constraints_ == 2
+        assert nppe(Pi, N, found.predict(X)) < limit
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(0, 2**32 - 1))
+def test_the_component_that_stays_is_separated_from_a_task_that_varies(seed):
+    rng = np.random.default_rng(seed)
+    X = rng.uniform(-1, 1, (300, 2))
+    A = rng.normal(size=(1, 2))
+    _, component = constrained(np.broadcast_to(A, (300, 1, 2)), X @ [[-1.0, -0.5], [0.4, -1.0]] + [0.3, -0.2])
+    U = component + rng.normal(size=300)[:, None] * np.linalg.pinv(A)[:, 0]
+    found = uc.NullspaceComponent(alpha=0).fit(X, U)
+    np.testing.assert_allclose(found.predict(X), component, atol=1e-6)
+    assert found.score(X, U) > 1 - 1e-9
+
+
+def test_the_chain_learns_the_policy_that_inconsistency_alone_cannot():
+    rng = np.random.default_rng(3)
+    X = rng.uniform(-1, 1, (400, 2))
+    Pi = X @ [[-1.0, -0.5], [0.4, -1.0]] + [0.3, -0.2]
+    conditions = np.arange(400) % 4
+    A = rng.normal(size=(4, 1, 2))[conditions]
+    _, U = constrained(A, Pi)
+    U += rng.normal(size=(400, 1)) * np.linalg.pinv(A)[:, :, 0]
+    chain = uc.ConstraintChain(uc.ConstantConstraint(), uc.ParametricPolicy(), uc.NullspaceComponent(alpha=0))
+    clone(chain)
+    chain.fit(X, U, conditions=conditions)
+    assert uc.metrics.unconstrained_policy_error(Pi, chain.predict(X)) < 1e-10
+    assert uc.metrics.unconstrained_policy_error(Pi, uc.ParametricPolicy().fit(X, U).predict(X)) > 1e-2
+    assert sorted(chain.constraints_) == [0, 1, 2, 3]
+
+
+def test_errors_of_learnt_constraints_are_those_of_their_definitions():
+    rng = np.random.default_rng(4)
+    Pi = rng.normal(size=(50, 3))
+    N, U = constrained(rng.normal(size=(50, 1, 3)), Pi)
+    other, _ = constrained(rng.normal(size=(50, 1, 3)), Pi)
+    assert uc.metrics.projected_policy_error(Pi, N, N) == 0.0
+    assert uc.metrics.projected_observation_error(U, N) == pytest.approx(0.0, abs=1e-28)
+    each = [np.sum((n @ p - o @ p) ** 2) for n, o, p in zip(N, other, Pi, strict=True)]
+    assert uc.metrics.projected_policy_error(Pi, N, other) == pytest.approx(np.mean(each))
+
+
+X, SPANNING = np.zeros((60, 2)), np.random.default_rng(0).normal(size=(60, 3))
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: uc.ConstantConstraint().fit(X, SPANNING), "the actions span all 3 directions"),
+        (
+            lambda: uc.FeatureConstraint(n_constraints=None).fit(X, SPANNING),
+            "the actions span all 3 directions",
+        ),
+        (lambda: uc.ConstantConstraint().fit(X[:2], SPANNING[:2]), "2 samples are fewer than the 3 actions"),
+        (lambda: uc.ConstantConstraint().fit(X, SPANNING[:, :1]), "needs two or more actions"),
+        (lambda: uc.ConstantConstraint().fit(X, 0 * SPANNING), "all actions are zero"),
+        (lambda: uc.ConstantConstraint(3).fit(X, SPANNING), "whole number from 1 to 2"),
+        (lambda: uc.FeatureConstraint(alpha=0).fit(X, SPANNING), "alpha must be a finite number above zero"),
+        (lambda: uc.FeatureConstraint(lambda X: X).fit(X, SPANNING), "the Jacobian must be"),
+        (lambda: uc.FeatureConstraint(3).fit(X, SPANNING), "features must be"),
+        (lambda: uc.NullspaceComponent().fit(X, SPANNING[:, :1]), "need two or more actions"),
+        (lambda: uc.NullspaceComponent().fit(X, 0 * SPANNING), "nothing to separate"),
+        (
+            lambda: uc.ConstraintChain(uc.ConstantConstraint(1), uc.ParametricPolicy()).fit(
+                X, SPANNING, conditions=[0]
+            ),
+            "one label a sample, 60 in all",
+        ),
+    ],
+)
+def test_mistakes_are_told_in_one_sentence(call, sentence):
+    with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_constraints_are_saved_and_loaded(tmp_path):
+    rng = np.random.default_rng(5)
+    X, U = constrained_plane(rng)
+    for estimator in (uc.ConstantConstraint(), uc.FeatureConstraint(uc.NormalizedRBF(5))):
+        estimator.fit(X, U).save(tmp_path / "c.skops")
+        np.testing.assert_array_equal(
+            uc.load_constraint(tmp_path / "c.skops").predict(X), estimator.predict(X)
+        )
+    uc.ParametricPolicy().fit(X, U).save(tmp_path / "p.skops")
+    with pytest.raises(uc.errors.PolicyFileError, match="holds a ParametricPolicy, not a constraint"):
+        uc.load_constraint(tmp_path / "p.skops")
+
+
+def constrained_plane(rng):
+    X = rng.uniform(-1, 1, (200, 3))
+    _, U = constrained(
+        np.broadcast_to([[0.0, 0.6, 0.8]], (200, 1, 3)), np.cos(3 * X) + rng.normal(size=X.shape)
+    )
+    return X, U
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    """A recording on a tilted table, with forces and flags, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    X, U = constrained_plane(np.random.default_rng(6))
+    forces = np.where(np.arange(200)[:, None] < 150, [[0.0, 3.0, 4.0]], 0.0)
+    free = (np.arange(200) >= 150)[:, None]
+    names = "x,y,z,vx,vy,vz,fx,fy,fz,free"
+    np.savetxt("table.csv", np.hstack([X, U, forces, free]), delimiter=",", header=names, comments="")
+    np.savetxt("any.csv", np.hstack([X, np.random.default_rng(7).normal(size=X.shape), forces, free]), delimiter=",",
+               header=names, comments="")  # fmt: skip
+    return ["--state", "x,y,z", "--action", "vx,vy,vz"]
+
+
+def test_the_command_prints_saves_and_draws_the_constraint(run, table, tmp_path):
+    code, out, _ = run("constraints", "table.csv", *table, "--out", "c.skops", "--figure", "c.png")
+    assert code == 0
+    assert "0.800 vz + 0.600 vy ≈ 0" in out
+    assert "1 of 3 directions" in out
+    assert (tmp_path / "c.png").stat().st_size > 0
+    assert uc.load_constraint("c.skops").n_constraints_ == 1
+    code, out, _ = run("constraints", "table.csv", *table, "--model", "rbf")
+    assert code == 0
+    assert "0.800 vz + 0.600 vy ≈ 0" in out
+
+
+def test_fit_takes_forces_and_flags(run, table):
+    forces = ["--force", "fx,fy,fz", "--force-threshold", "2"]
+    code, out, _ = run("fit", "table.csv", *table, "--model", "linear", *forces)
+    assert code == 0
+    assert "75.0% in contact, 25.0% free" in out
+    assert "held-out error" in out
+    assert "held-out inconsistency" not in out
+    assert uc.load_policy("policy.skops").risk == "auto"
+    code, out, _ = run("fit", "table.csv", *table, "--model", "linear", "--free", "free")
+    assert "known of 25.0%" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["constraints", "any.csv"], "the actions span all 3 directions"),
+        (["constraints", "table.csv", "--rows", "3"], "whole number from 1 to 2"),
+        (["constraints", "table.csv", "--n-centers", "3"], "--n-centers is for --model rbf"),
+        (
+            ["fit", "table.csv", "--force", "fx,fy", "--force-threshold", "2"],
+            "forces have 2 components and actions 3",
+        ),
+        (["fit", "table.csv", "--force", "fx,fy,fz"], "--force needs --force-threshold"),
+        (["fit", "table.csv", "--force-threshold", "2"], "--force-threshold is for forces"),
+    ],
+)
+def test_mistakes_on_the_command_line_are_one_sentence(run, table, tmp_path, arguments, sentence):
+    code, _, err = run(*arguments, *table)
+    assert code == 2
+    assert sentence in err
+    assert "Traceback" not in err
+    assert not list(tmp_path.glob("*.skops"))
+
+
+def test_planar_arms_move_as_their_jacobian_says():
+    rng = np.random.default_rng(8)
+    plant, Q, dQ = PlanarArm((1.0, 0.7, 0.4)), rng.uniform(-2, 2, (20, 3)), 1e-6 * rng.normal(size=(20, 3))
+    moved = plant.pose(Q + dQ) - plant.pose(Q - dQ)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", plant.jacobian(Q), 2 * dQ), moved, atol=1e-14)
+
+
+def test_the_experiment_finds_every_constraint_it_can_hold_without_noise():
+    for name, setting in constraints_trials.settings(0).items():
+        D = setting.record()
+        found = setting.estimator.fit(D.states, D.actions, groups=D.episodes)
+        assert nppe(D.policy, D.projections, found.predict(D.states)) < 1e-20, name
+
+
+def test_without_the_extra_the_experiment_says_what_it_left_out(tmp_path, monkeypatch):
+    def missing():
+        raise uc.errors.UnconstrainError("robots are simulated by MuJoCo, which is not here")
+
+    monkeypatch.setattr(constraints, "simulator", missing)
+    outcome = constraints.reproduce(tmp_path, trials=1, console=Console(quiet=True), data=tmp_path)
+    assert (
+        "Measured constraints are left out: robots are simulated by MuJoCo, which is not here."
+        in outcome.findings
+    )
+    assert outcome.findings[-1].startswith("The recorded surfaces are left out")
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recorded surfaces are not here")
+def test_the_recorded_surfaces_are_found():
+    flat, curved = constraints_surfaces.recordings(RECORDINGS)
+    constant = uc.ConstantConstraint().fit(flat.states, flat.actions, groups=flat.blocks(10))
+    assert constant.n_constraints_ == 1
+    plane = np.linalg.svd(flat.states - flat.states.mean(axis=0), full_matrices=False)[2][-1]
+    angle = np.degrees(np.arccos(abs(plane @ constant.rows_[0])))
+    assert angle < 3 * np.degrees(constant.uncertainty_)
+    errors = [
+        uc.metrics.projected_observation_error(
+            curved.actions,
+            held_out_projections(each, curved.states, curved.actions, curved.blocks(10)),
+        )
+        for each in (uc.ConstantConstraint(1), uc.FeatureConstraint(uc.NormalizedRBF(5)))
+    ]
+    assert errors[1] < errors[0] / 4

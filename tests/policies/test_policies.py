@@ -1,0 +1,270 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn.kernel_approximation import Nystroem
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, SplineTransformer, StandardScaler
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+import unconstrain as uc
+from tests.problems import problems, rotation
+from unconstrain import limit_cycle as toy
+
+RISKS = st.sampled_from(["auto", "inconsistency", "direct", "constrained"])
+
+
+@parametrize_with_checks(
+    [
+        uc.ParametricPolicy(),
+        uc.ParametricPolicy(uc.NormalizedRBF(10)),
+        uc.ParametricPolicy(uc.NormalizedRBF(10, centers="coverage"), alpha="cv"),
+        uc.ParametricPolicy(SplineTransformer()),
+        uc.ParametricPolicy(risk="direct"),
+        uc.LocallyLinearPolicy(),
+        uc.LocallyLinearPolicy(centers="kmeans", alpha="cv"),
+        uc.LocallyLinearPolicy(width=2.0, risk="direct"),
+        uc.NormalizedRBF(),
+        uc.NormalizedRBF(9, centers="grid"),
+    ],
+    # Folds count samples, so a sample repeated is not one of twice the weight: so it is for every estimator that
+    # cross-validates by itself.
+    expected_failed_checks=lambda estimator: (
+        {"check_sample_weight_equivalence_on_dense_data": "folds"}
+        if getattr(estimator, "alpha", 0) == "cv"
+        else {}
+    ),
+)
+def test_scikit_learn_estimator_checks(estimator, check):
+    check(estimator)
+
+
+def policies(X, name):
+    """One of each kind, with nothing placed by the data: only then do the laws of sums hold to rounding.
+
+    λ well above the rounding of the largest moments, so that what is compared is the policy, not its noise.
+    """
+    centers, width = X[:3].copy(), 2.0 * float(np.std(X)) + 1e-3
+    alpha = 1e-3
+    return [
+        uc.ParametricPolicy(risk=name, alpha=alpha),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width), risk=name, alpha=alpha),
+        uc.LocallyLinearPolicy(centers=centers, width=width, risk=name, alpha=alpha),
+    ]
+
+
+def extra(name, N):
+    return {"projections": N} if name in ("constrained", "auto") else {}
+
+
+def partly_known(name, N):
+    """For "auto", every other projection is not known."""
+    return np.where(np.arange(len(N))[:, None, None] % 2, np.nan, N) if name == "auto" else N
+
+
+def assert_same(A, B):
+    np.testing.assert_allclose(A, B, rtol=1e-5, atol=1e-6 * np.abs(B).max(initial=1e-12))
+
+
+@settings(deadline=None, max_examples=40)
+@given(problems(min_samples=6), RISKS, st.floats(0.35, 0.8))
+def test_partial_fit_in_pieces_equals_fit(problem, name, share):
+    X, _, N, U, rng = problem
+    N = partly_known(name, N)
+    weights, cut = rng.random(len(X)) + 0.1, max(3, int(share * len(X)))
+    if not np.any(U[:cut]):
+        return
+    for policy in policies(X, name):
+        whole = policy.fit(X, U, sample_weight=weights, **extra(name, N)).predict(X)
+        piecewise = type(policy)(**policy.get_params(deep=False))
+        for part in (slice(cut), slice(cut, None)):
+            piecewise.partial_fit(X[part], U[part], sample_weight=weights[part], **extra(name, N[part]))
+        assert_same(piecewise.predict(X), whole)
+        assert piecewise.n_zero_actions_ == policy.n_zero_actions_
+        assert piecewise.n_samples_seen_ == len(X)
+
+
+@settings(deadline=None, max_examples=40)
+@given(problems(min_samples=6), RISKS)
+def test_order_of_samples_does_not_matter(problem, name):
+    X, _, N, U, rng = problem
+    N = partly_known(name, N)
+    if not np.any(U):
+        return
+    order = rng.permutation(len(X))
+    for policy in [*policies(X, name), uc.LocallyLinearPolicy(n_centers=3, risk=name, alpha=1e-3)]:
+        before = policy.fit(X, U, **extra(name, N)).predict(X)
+        assert_same(policy.fit(X[order], U[order], **extra(name, N[order])).predict(X), before)
+
+
+@settings(deadline=None, max_examples=40)
+@given(problems(min_samples=6), RISKS, st.floats(0.01, 100.0))
+def test_scaling_actions_scales_the_policy(problem, name, c):
+    X, _, N, U, _ = problem
+    N = partly_known(name, N)
+    if not np.any(U):
+        return
+    for policy in policies(X, name):
+        before = policy.fit(X, U, **extra(name, N)).predict(X)
+        assert_same(policy.fit(X, c * U, **extra(name, N)).predict(X), c * before)
+
+
+@settings(deadline=None, max_examples=40)
+@given(problems(min_samples=6), RISKS)
+def test_rotating_the_action_space_rotates_the_policy(problem, name):
+    X, _, N, U, rng = problem
+    N = partly_known(name, N)
+    if not np.any(U):
+        return
+    R = rotation(U.shape[1], rng)
+    for policy in policies(X, name):
+        before = policy.fit(X, U, **extra(name, N)).predict(X)
+        assert_same(policy.fit(X, U @ R.T, **extra(name, R @ N @ R.T)).predict(X), before @ R.T)
+
+
+@pytest.mark.parametrize(
+    "transformer",
+    [
+        None,
+        SplineTransformer(),
+        PolynomialFeatures(3),
+        Nystroem(n_components=30, random_state=0),
+        uc.NormalizedRBF(),
+    ],
+)
+def test_any_transformer_learns_what_ordinary_regression_cannot(transformer):
+    seen, unseen = toy.demonstrate(random_state=0), toy.demonstrate(random_state=1)
+
+    def error(risk):
+        policy = uc.ParametricPolicy(transformer, risk=risk, alpha="cv")
+        policy.fit(seen.states, seen.actions, groups=seen.episodes)
+        return uc.metrics.unconstrained_policy_error(unseen.policy, policy.predict(unseen.states))
+
+    assert error("inconsistency") < 0.5 * error("direct")
+
+
+def test_known_projections_and_the_oracle_agree_on_the_toy():
+    demos, unseen = toy.demonstrate(random_state=0), toy.demonstrate(random_state=1)
+    features = uc.NormalizedRBF(centers="grid", width=0.7)
+    for policy, target, known in [
+        (
+            uc.ParametricPolicy(features, risk="constrained", alpha="cv"),
+            demos.actions,
+            {"projections": demos.projections},
+        ),
+        (uc.ParametricPolicy(features, risk="direct", alpha="cv"), demos.policy, {}),
+    ]:
+        policy.fit(demos.states, target, groups=demos.episodes, **known)
+        error = uc.metrics.unconstrained_policy_error(unseen.policy, policy.predict(unseen.states))
+        assert uc.metrics.normalized(error, unseen.policy) < 1e-3
+
+
+def test_chosen_alpha_has_the_least_held_out_risk_and_respects_episodes():
+    demos = toy.demonstrate(random_state=0, noise=0.1)
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(), alpha="cv").fit(
+        demos.states, demos.actions, groups=demos.episodes
+    )
+    as_good = policy.held_out_risk_ <= 1.01 * policy.held_out_risk_.min()
+    assert policy.alpha_ == policy.alphas_[as_good].max()
+    fold = policy.folds_.assign(demos.episodes, len(demos.states))
+    for episode in np.unique(demos.episodes):
+        assert len(np.unique(fold[demos.episodes == episode])) == 1
+    assert len(np.unique(fold)) == 5
+
+
+def test_partial_fit_deals_episodes_out_as_fit_does():
+    demos = toy.demonstrate(n_episodes=7, random_state=0)
+    features = uc.NormalizedRBF(centers=demos.states[::20], width=0.6)
+    whole = uc.ParametricPolicy(features, alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
+    pieces = uc.ParametricPolicy(features, alpha="cv")
+    for part in (slice(0, 50), slice(50, 130), slice(130, None)):  # episodes of 40 straddle the pieces
+        pieces.partial_fit(demos.states[part], demos.actions[part], groups=demos.episodes[part])
+    assert pieces.alpha_ == pytest.approx(whole.alpha_)
+    assert_same(pieces.predict(demos.states), whole.predict(demos.states))
+
+
+def test_rank_deficient_data_give_the_least_policy_that_explains_them():
+    X = np.random.default_rng(0).normal(size=(30, 3))
+    U = np.outer(X[:, 0], [1.0, 0.0])  # nothing is ever seen of the second action
+    policy = uc.ParametricPolicy(alpha=0.0).fit(X, U)
+    np.testing.assert_allclose(policy.predict(X), U, atol=1e-9)
+
+
+def test_far_from_every_centre_the_policy_stays_finite():
+    demos = toy.demonstrate(random_state=0)
+    far = np.array([[1e6, -1e6], [1e-3, 1e8]])
+    for policy in (uc.LocallyLinearPolicy(), uc.ParametricPolicy(uc.NormalizedRBF())):
+        assert np.isfinite(policy.fit(demos.states, demos.actions).predict(far)).all()
+
+
+def test_coverage_covers_every_sample():
+    X = np.random.default_rng(0).uniform(-1, 1, size=(500, 3))
+    for policy in (uc.LocallyLinearPolicy(width=0.5, coverage=0.7), uc.LocallyLinearPolicy(n_centers=40)):
+        policy.fit(X, X)
+        nearest = np.min(np.sum((X[:, None] - policy.centers_) ** 2, axis=2), axis=1)
+        assert np.exp(-nearest / (2 * policy.width_**2)).min() >= 0.7 * (1 - 1e-9)
+    assert len(policy.centers_) == 40
+
+
+def test_sits_in_pipelines_and_searches():
+    demos = toy.demonstrate(random_state=0)
+    pipeline = make_pipeline(StandardScaler(), uc.LocallyLinearPolicy(alpha="cv"))
+    assert pipeline.fit(demos.states, demos.actions).score(demos.states, demos.actions) > 0.9
+    search = GridSearchCV(
+        uc.ParametricPolicy(uc.NormalizedRBF(centers="grid")), {"features__width": [0.05, 0.6]}
+    )
+    assert search.fit(demos.states, demos.actions).best_params_["features__width"] == 0.6
+
+
+X, U = np.eye(4)[:, :2], np.ones((4, 2))
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: uc.ParametricPolicy().fit(X, np.zeros((4, 2))), "all actions are zero"),
+        (lambda: uc.ParametricPolicy().fit(X[:1], U[:1]), "one sample"),
+        (lambda: uc.ParametricPolicy().fit(X, U[:3]), r"inconsistent numbers of samples: \[4, 3\]"),
+        (
+            lambda: uc.ParametricPolicy().fit([[1.0], [np.nan]], [[1.0], [2.0]]),
+            "X contains NaN in row 1, column 0",
+        ),
+        (
+            lambda: uc.ParametricPolicy().fit([[1.0], [2.0]], [[np.inf], [2.0]]),
+            r"infinite value \(inf\) in row 0",
+        ),
+        (
+            lambda: uc.ParametricPolicy().fit(X, U).predict(np.ones((3, 5))),
+            "X has 5 features, but ParametricPolicy",
+        ),
+        (
+            lambda: uc.ParametricPolicy().fit(X, U).partial_fit(X, U[:, :1]),
+            "1 dimensions, but this policy has learnt 2",
+        ),
+        (lambda: uc.ParametricPolicy(risk="naive").fit(X, U), "risk must be one of 'auto', 'inconsistency'"),
+        (lambda: uc.ParametricPolicy(alpha="best").fit(X, U), "alpha, where it is not a number"),
+        (lambda: uc.ParametricPolicy(alpha=-1).fit(X, U), "alpha must be a finite number of at least zero"),
+        (lambda: uc.ParametricPolicy(3).fit(X, U), "features must be"),
+        (lambda: uc.ParametricPolicy(risk="constrained").fit(X, U), "needs the projections"),
+        (
+            lambda: uc.ParametricPolicy(risk="direct").fit(X, U, projections=np.zeros((4, 2, 2))),
+            "projections are for",
+        ),
+        (
+            lambda: uc.ParametricPolicy(risk="constrained").fit(X, U, projections=np.full((4, 2, 2), np.nan)),
+            'row 0 is NaN, that is, not known: .* risk="auto"',
+        ),
+        (lambda: uc.ParametricPolicy(alpha="cv").fit(X, U, groups=[1] * 4), "at least two episodes"),
+        (lambda: uc.ParametricPolicy().fit(X, U, groups=[1]), "one episode label a sample"),
+        (lambda: uc.LocallyLinearPolicy(width=0).fit(X, U), "width must be a finite number above zero"),
+        (lambda: uc.LocallyLinearPolicy(centers="here").fit(X, U), "centers must be one of"),
+        (lambda: uc.LocallyLinearPolicy(centers=np.ones((3, 3))).fit(X, U), r"centers must be \(M, 2\)"),
+        (lambda: uc.LocallyLinearPolicy(coverage=1.5).fit(X, U), "coverage must be a number between 0 and 1"),
+        (lambda: uc.LocallyLinearPolicy(n_centers=0).fit(X, U), "n_centers must be a whole number"),
+    ],
+)
+def test_mistakes_are_told_in_one_sentence(call, sentence):
+    with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
+        call()
+    assert "\n" not in str(caught.value)

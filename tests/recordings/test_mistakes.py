@@ -1,0 +1,201 @@
+"""`load` on recordings that cannot be used: one sentence each, naming the file and the place in it."""
+
+import contextlib
+import io
+import json
+import pickle
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
+from unconstrain.recordings import load, save
+
+XU = {"state": "x", "action": "u"}
+XT = {"state": "x", "time": "t"}
+MOVING = "t,x\n" + "".join(f"{i / 50},{i}\n" for i in range(20))
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "sentence"),
+    [
+        ("", XU, r"a.csv is empty"),
+        ("\n \n# only this\n", XU, r"a.csv is empty"),
+        ("x,u\n", XU, r"a.csv has a header but no samples"),
+        ("x,u\n1,2\n", XU, r"a.csv has one sample"),
+        ("x,u\n1,0\n2,0\n", XU, r"all actions of .*a.csv are zero"),
+        ("x,v\n1,2\n", XU, r"a.csv has no column 'u' for action; its columns are 0 'x', 1 'v'"),
+        ("x,velocity\n1,2\n", XU | {"action": "velocty"}, r"did you mean 'velocity'\?"),
+        ("1,2\n3,4\n", XU, r"a.csv has no column 'x' for state; it has no header but 2 columns"),
+        ("x,u\n1,2\n", XU | {"state": 2}, r"no column at position 2 for state: .*from 0 to 1"),
+        ("x,u\n1,2\n", XU | {"state": -1}, r"no column at position -1"),
+        ("x,u\n1,2\n", XU | {"state": True}, r"state takes column names or positions .* got True"),
+        ("x,u\n1,2\n", XU | {"state": 1.5}, r"state takes column names or positions .* got 1.5"),
+        ("x,u\n1,2\n", XU | {"state": []}, r"no state columns were given"),
+        ("x,u\n1,2\n", {}, r"so say state=; its columns are 0 'x', 1 'u'"),
+        ("x,u\n1,2\n", {"action": "u"}, r"give state= too"),
+        ("x,u\n1,2\n", {"state": "x"}, r"give action=, or time="),
+        ("x,u\n1,2\n\n# here\n3,oops\n", XU, r"column 'u' holds 'oops' at line 5 where a number is needed"),
+        ("1,2\n3,oops\n", {"state": 0, "action": 1}, r"column 1 \(counted from 0\) holds 'oops' at line 2"),
+        ("x,x,u\n1,2,3\n1,b,3\n", XU | {"state": 1}, r"column 1 \('x', counted from 0\) holds 'b' at line 3"),
+        ("x,u\n1,2\n3,\n5,\n", XU, r"column 'u' is empty at line 3 and 1 more"),
+        ("x\tu\n1\t2\n\t\n", XU, r"column 'x' is empty at line 3"),
+        ("x,u\n1,2\nnan,3\n", XU, r"column 'x' holds nan at line 3"),
+        ("x,u\n1,2\n3,1e300\n", XU, r"column 'u' holds 1e\+300 at line 3"),
+        ("x,u\n" + "1" * 200_000 + ",2\n", XU, r"a.csv cannot be read as a text table"),
+        ("x,u\n1,-inf\n2,3\n", XU, r"column 'u' holds -inf at line 2"),
+        ("x,u\n1,2\n3,4,5\n", XU, r"a.csv: line 3 has 3 cells where the first line has 2"),
+        ("x,u\n1,2\n3\n", XU, r"a.csv: line 3 has 1 cell where the first line has 2"),
+        ("x,u,e\n1,2,a\n3,4,\n", XU | {"episode": "e"}, r"column 'e' is empty at line 3"),
+        (b"\x00\x01\x02\xff" * 50, XU, r"a.csv is not a text table"),
+        ("x,u\n1,2\n".encode("utf-16"), XU, r"a.csv is not a text table: save it as UTF-8"),
+        ("x,u\n1,2\n°,3\n".encode("latin-1"), XU, r"not UTF-8 text at line 3"),
+        ("t,x\n0,1\n1,2\n1,3\n", XT, r"time in column 't' repeats a stamp at line 4"),
+        ("t,x\n0,1\n2,2\n1,3\n", XT, r"time in column 't' goes back at line 4"),
+        ("t,x\n0,1\nlater,2\n", XT, r"column 't' holds 'later' at line 3"),
+        ("t,x\n0,1\n,2\n", XT, r"column 't' is empty at line 3"),
+        ("t,x\n0,1\n1,2\n", XT, r"episode 'a' has 2 samples over 1 s, too few .* window=0.2"),
+        ("t,x\n0,1\n", XT, r"episode 'a' has 1 sample over 0 s, too few"),
+        (MOVING, XT | {"window": 2}, r"episode 'a' has 20 samples over 0.38 s, too few .* window=2 s"),
+        (
+            MOVING,
+            XT | {"time_unit": "min"},
+            r"time_unit must be one of s, ms, us, ns",
+        ),
+        (MOVING, XT | {"window": 0}, r"window must be a positive number, got 0"),
+        (MOVING, XT | {"max_speed": "fast"}, r"max_speed must be a positive number, got 'fast'"),
+        (MOVING, XT | {"max_speed": 1e-9}, r"no fragment lasts 0.2 s; raise gap or max_speed"),
+        (MOVING, {"state": "x", "action": "t", "max_speed": 1}, r"max_speed needs to know the time"),
+        (MOVING, XT | {"min_speed": 1e9}, r"no sample is as fast as min_speed=1e\+09"),
+        ("t,x\n" + "".join(f"{i / 50},3.3\n" for i in range(20)), XT, r"are zero: the states do not move"),
+        ("t,x,e\n0,1,a\n1,2,b\n0,3,a\n", XT | {"episode": "e"}, r"repeats a stamp at line 4"),
+    ],
+)
+def test_text_tables(tmp_path, content, options, sentence):
+    path = tmp_path / "a.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(DataError, match=sentence) as caught:
+        load(path, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_paths(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("x,u\n1,2\n3,4\n")
+    (tmp_path / "b.xlsx").write_text("x")
+    (tmp_path / "folder.csv").mkdir()
+    for paths, sentence in [
+        (tmp_path / "none.csv", r"there is no file .*none.csv"),
+        (tmp_path / "folder.csv", r"is a folder without Parquet files: give its files, or a pattern"),
+        (tmp_path / "b.xlsx", r"suffix '.xlsx'; those known are .csv, .tsv, .txt, .npz, .parquet"),
+        (str(tmp_path / "*.tsv"), r"no file matches"),
+        ([], r"no files were given"),
+        ([path, path], r"a.csv is given twice"),
+        (None, r"paths must be a path or several"),
+        ([1], r"paths must be a path or several"),
+    ]:
+        with pytest.raises(DataError, match=sentence):
+            load(paths, **XU)
+
+
+def npz(**arrays):
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+ONES = np.ones(3)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (npz(x=ONES, u=ONES[:2]), r"there are 3 states but 2 actions"),
+        (npz(x=np.array([1, np.nan, 2]), u=ONES), r"column 'x' holds nan at row 1 \(counted from 0\)"),
+        (npz(x=np.array(["a", "b", "c"]), u=ONES), r"column 'x' holds 'a' at row 0"),
+        (npz(x=np.ones((3, 2, 2)), u=ONES), r"'x' has shape \(3, 2, 2\) where \(N,\) or \(N, k\) is needed"),
+        (npz(x=np.array([1, "a", None], dtype=object), u=ONES), r"'x' holds pickled Python objects"),
+        (npz(x=ONES * 1j, u=ONES), r"'x' holds values of type complex128"),
+        (npz(x=ONES[:0], u=ONES[:0]), r"empty"),
+        (npz(), r"is empty|is damaged"),
+        (npz(x=ONES, u=ONES)[:-40], r"a.npz is damaged"),
+        (npz(x=ONES, u=ONES).replace(ONES.tobytes(), b"\x07" * 24), r"a.npz is damaged"),
+        (pickle.dumps({"x": ONES}), r"a.npz is not an NPZ archive"),
+        (b"", r"a.npz is empty"),
+    ],
+)
+def test_npz(tmp_path, content, sentence):
+    (tmp_path / "a.npz").write_bytes(content)
+    with pytest.raises(DataError, match=sentence):
+        load(tmp_path / "a.npz", **XU)
+
+
+def parquet(columns):
+    buffer = io.BytesIO()
+    pq.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (parquet({"x": [1.0, None], "u": [1, 2]}), r"column 'x' is empty at row 1"),
+        (parquet({"x": [True, False], "u": [1, 2]}), r"column 'x' holds bool values where numbers"),
+        (
+            parquet({"x": [[1], [2, 3]], "u": [1, 2]}),
+            r"'x' holds lists that .* differ in length, first at row 1",
+        ),
+        (parquet({"x": [{"a": 1}] * 2, "u": [1, 2]}), r"'x' holds struct<a: int64> values"),
+        (parquet({"x": pa.array([], pa.float64()), "u": pa.array([], pa.float64())}), r"has no samples"),
+        (parquet({"y": [1], "u": [1]}), r"no column 'x' for state"),
+        (parquet({"x": [1.0], "u": [1]})[:-9], r"a.parquet is damaged or not a Parquet file"),
+        (b"nothing like it", r"a.parquet is damaged or not a Parquet file"),
+    ],
+)
+def test_parquet(tmp_path, content, sentence):
+    (tmp_path / "a.parquet").write_bytes(content)
+    with pytest.raises(DataError, match=sentence):
+        load(tmp_path / "a.parquet", **XU)
+
+
+def test_one_role_one_column(tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.ones((3, 2)), u=ONES)
+    with pytest.raises(DataError, match=r"episode takes one column, but 'x' stands for 2"):
+        load(tmp_path / "a.npz", state="x", action="u", episode="x")
+    np.savez(tmp_path / "a.npz", x=ONES, u=ONES, e=ONES[:2])
+    with pytest.raises(DataError, match=r"3 states but 2 episode values"):
+        load(tmp_path / "a.npz", state="x", action="u", episode="e")
+    with pytest.raises(DataError, match=r"2 stamps for 3 samples"):
+        load(tmp_path / "a.npz", state="x", action="u", time="e")
+
+
+def test_saved_files_that_are_damaged_or_too_new(tmp_path):
+    demos = Demonstrations(np.ones((3, 2)), np.ones((3, 2)))
+    path = tmp_path / "a.npz"
+    save(demos, path)
+    good = dict(np.load(path))
+    about = json.loads(str(good["unconstrain"]))
+    for changes, sentence in [
+        ({"unconstrain": np.array(json.dumps(about | {"format": 99}))}, "newer release"),
+        ({"unconstrain": np.array("{")}, "damaged and cannot be read as saved"),
+        ({"states": np.ones((2, 2))}, "damaged and cannot be read as saved"),
+        ({"episodes": np.array([0, 0, 5])}, "damaged and cannot be read as saved"),
+    ]:
+        np.savez(path, **good | changes)
+        with pytest.raises(DataError, match=sentence):
+            load(path)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".parquet"])
+def test_a_changed_byte_of_a_saved_file_is_noticed(tmp_path, suffix):
+    states = np.random.default_rng(0).normal(size=(200, 3))
+    path = tmp_path / f"a{suffix}"
+    save(Demonstrations(states, states), path)
+    good = path.read_bytes()
+    for place in range(50, len(good), 499):
+        path.write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])
+        with contextlib.suppress(DataError):  # otherwise it was a byte of no consequence
+            np.testing.assert_array_equal(load(path).states, states)

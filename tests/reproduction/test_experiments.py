@@ -1,0 +1,102 @@
+"""Experiments: trials that survive an interruption, and small runs of the toy and the finger."""
+
+import json
+from io import StringIO
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from reproduction import experiment, finger, toy
+from reproduction.trials import run_trials
+from unconstrain.errors import UnconstrainError
+
+
+def quiet():
+    return Console(file=StringIO(), width=200)
+
+
+def drawn(seed):
+    return {"value": float(np.random.default_rng(seed).normal())}
+
+
+class InterruptedAt:
+    """The trial during which somebody presses Ctrl-C."""
+
+    def __init__(self, seed):
+        self.seed = seed
+
+    def __call__(self, seed):
+        if seed == self.seed:
+            raise KeyboardInterrupt
+        return drawn(seed)
+
+
+def never(seed):
+    raise AssertionError("this trial was kept and must not run again")
+
+
+def test_interrupted_and_resumed_equals_uninterrupted(tmp_path):
+    settings = {"width": 0.6}
+    whole = run_trials(drawn, 6, tmp_path / "whole.jsonl", settings=settings, console=quiet())
+    console = quiet()
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(InterruptedAt(3), 6, tmp_path / "kept.jsonl", settings=settings, console=console)
+    assert "3 of 6 are kept" in console.file.getvalue()
+    assert run_trials(drawn, 6, tmp_path / "kept.jsonl", settings=settings, console=quiet()) == whole
+    assert run_trials(never, 6, tmp_path / "kept.jsonl", settings=settings, console=quiet()) == whole
+
+
+def test_a_trial_cut_short_while_it_was_written_runs_again(tmp_path):
+    kept = tmp_path / "kept.jsonl"
+    whole = run_trials(drawn, 3, kept, settings={}, console=quiet())
+    kept.write_text(kept.read_text()[:-20])
+    assert run_trials(drawn, 3, kept, settings={}, console=quiet()) == whole
+    assert run_trials(never, 3, kept, settings={}, console=quiet()) == whole
+
+
+def test_a_changed_setting_never_uses_old_trials(tmp_path):
+    kept = tmp_path / "kept.jsonl"
+    old = run_trials(drawn, 2, kept, settings={"width": 0.6}, console=quiet())
+    new = run_trials(lambda seed: {"value": -1.0}, 2, kept, settings={"width": 0.8}, console=quiet())
+    assert new == [{"value": -1.0}] * 2
+    assert run_trials(never, 2, kept, settings={"width": 0.6}, console=quiet()) == old
+
+
+def test_processes_do_not_change_results(tmp_path):
+    alone = run_trials(drawn, 4, tmp_path / "a.jsonl", settings={}, console=quiet())
+    assert run_trials(drawn, 4, tmp_path / "b.jsonl", settings={}, jobs=2, console=quiet()) == alone
+
+
+def test_mistakes_are_told_in_a_sentence(tmp_path):
+    with pytest.raises(UnconstrainError, match="at least one trial and one job"):
+        run_trials(drawn, 0, tmp_path / "kept.jsonl", settings={})
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UnconstrainError, match="cannot keep trials"):
+        run_trials(drawn, 1, tmp_path / "file" / "kept.jsonl", settings={})
+    with pytest.raises(UnconstrainError, match="no experiment 'toe': choose one of finger, toy"):
+        experiment("toe")
+
+
+def test_toy_in_small(tmp_path):
+    outcome = toy.reproduce(tmp_path, trials=2, console=quiet())
+    for name in ("fig3.png", "fig3.svg", "fig4.png", "fig4.svg", "trials.json", "table.md"):
+        assert (tmp_path / name).stat().st_size > 0
+    assert all(path.is_file() for path in (*outcome.figures, *outcome.files))
+    trials = json.loads((tmp_path / "trials.json").read_text())["trials"]
+    assert len(trials) == 2
+    for trial in trials:
+        ours = trial["inconsistency, 40 trajectories"]
+        assert ours["nUPE"] < 0.0027
+        assert ours["nCPE"] <= ours["nUPE"]
+        assert trial["direct, 40 trajectories"]["nUPE"] > 0.3
+    again = toy.reproduce(tmp_path, trials=2, console=quiet())
+    assert again.table == outcome.table
+
+
+def test_finger(tmp_path):
+    outcome = finger.reproduce(tmp_path, console=quiet())
+    assert {path.name for path in outcome.figures} == {"fig1.png"}
+    errors = json.loads((tmp_path / "errors.json").read_text())
+    assert errors["inconsistency"]["nUPE"] < 1e-6
+    assert errors["direct"]["nUPE"] > 1000 * errors["inconsistency"]["nUPE"]

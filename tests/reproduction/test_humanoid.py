@@ -1,0 +1,214 @@
+"""Grasping and posture: small data sets already reach the published figures; pictures, and the viewer's loop."""
+
+import importlib.metadata
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from threadpoolctl import threadpool_limits
+
+import unconstrain as uc
+from reproduction import grasp, grasp_figures, grasp_video, grasp_viewer, posture, published
+from reproduction.plants.grasping import Attractor, Demonstrator, constrain
+from reproduction.plants.rendering import NoOpenGL
+from reproduction.robots import OUR_OWN, RobotChoice
+from unconstrain import metrics as risk
+
+pytest.importorskip("mujoco")
+pytest.importorskip("mink")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread():
+    with threadpool_limits(1):  # as in every process of an experiment
+        yield
+
+
+@pytest.fixture(scope="module")
+def demonstrator():
+    return grasp.demonstrator_of(OUR_OWN)
+
+
+@pytest.fixture(scope="module")
+def recorded(demonstrator):
+    return grasp.training(demonstrator, 0, n=50, duration=1.0)
+
+
+@pytest.fixture(scope="module")
+def policies(demonstrator, recorded):
+    learnt = {kind: grasp.learn(recorded[0].demonstrations, kind)[0] for kind in ("inconsistency", "direct")}
+    return {"expert": demonstrator.policy, **learnt}
+
+
+def test_the_policy_is_the_paper_s_gradient(demonstrator):
+    policy, rng = demonstrator.policy, np.random.default_rng(0)
+    X = policy.target + 0.3 * rng.standard_normal((5, 6))
+
+    def potential(x):
+        return 0.25 * (1 - np.exp(-np.sum((x - policy.target) ** 2, axis=-1) / (2 * 2.0)))
+
+    h = 1e-6 * np.eye(6)
+    gradient = (potential(X[:, None] + h) - potential(X[:, None] - h)) / 2e-6
+    np.testing.assert_allclose(policy(X), -16.0 * gradient, atol=1e-8)
+    np.testing.assert_allclose(Attractor(policy.target)(policy.target[None]), 0.0)
+
+
+def test_what_is_recorded_is_the_policy_behind_the_barrier(demonstrator, recorded):
+    recording, obstacle = recorded
+    D = recording.demonstrations
+    expected = np.einsum("nij,nj->ni", D.projections, D.policy)
+    assert np.linalg.norm(D.actions - expected) < 2e-3 * np.linalg.norm(expected)
+    assert recording.tracking < 2e-3
+    assert recording.movements_blocked >= 0.5
+    assert risk.inconsistency(D.actions, D.policy) < 1e-5 * risk.inconsistency(D.actions, 0 * D.policy)
+    # No hand gets nearer to its barrier than half the clearance.
+    X = D.states.reshape(D.n_episodes, -1, 2, 3)
+    for k in range(X.shape[1]):
+        for hand in range(2):
+            assert obstacle.nearest(X[:, k, hand])[0].min() > 0.5 * grasp.CLEARANCE
+
+
+def test_fifty_short_movements_reach_table_two(demonstrator, recorded, policies):
+    test = grasp.training(demonstrator, 1, n=8)[0].demonstrations
+    ours = grasp.columns(demonstrator, test, policies["inconsistency"].predict(test.states))
+    direct = grasp.columns(demonstrator, test, policies["direct"].predict(test.states))
+    assert list(ours) == list(published.GRASP)
+    assert ours["training constraints (nCPE)"] <= ours["unconstrained (nUPE)"]
+    for column in ours:
+        assert direct[column] > 10 * ours[column]
+
+
+def test_potential_features_go_far_below(demonstrator, recorded):
+    policy, name = grasp.learn(recorded[0].demonstrations, "inconsistency", "potential")
+    test = grasp.training(demonstrator, 1, n=4)[0].demonstrations
+    assert name == "potential"
+    assert max(grasp.columns(demonstrator, test, policy.predict(test.states)).values()) < 1e-3
+    with pytest.raises(uc.errors.UnconstrainError, match="choose local, potential or auto"):
+        grasp.model("inconsistency", "deep")
+
+
+def test_the_unseen_barrier_is_in_the_middle(demonstrator):
+    scene = demonstrator.scene
+    before = scene.origin + np.array([scene.barrier_x - scene.thickness / 2 - 0.01, 0, 0])
+    X = np.concatenate([before, before + np.array([0, 0.3, 0])])[None]
+    N, blocked = constrain(scene.central(1), X, np.ones((1, 6)))
+    assert blocked.tolist() == [[True, False]]
+    np.testing.assert_allclose(np.diag(N[0]), [0, 1, 1, 1, 1, 1], atol=1e-12)
+
+
+def test_grasp_reproduces_and_goes_on_from_kept_trials(tmp_path, monkeypatch, demonstrator, recorded):
+    quiet = Console(quiet=True)
+    small = {
+        "inconsistency": dict.fromkeys(published.GRASP, 0.001),
+        "direct": dict.fromkeys(published.GRASP, 0.4),
+    }
+    facts = (
+        "movements that meet the barrier",
+        "samples the barrier blocks",
+        "movements that meet the unseen barrier",
+    )
+    small |= {"inconsistency model": "local", "direct model": "local", "tracking error": 1e-4}
+    small |= dict.fromkeys(facts, 0.9)
+    monkeypatch.setattr(grasp, "run_trials", lambda *_, **__: [small])
+    monkeypatch.setattr(grasp, "training", lambda *_: recorded)
+    outcome = grasp.reproduce(tmp_path, trials=1, console=quiet)
+    assert "0.0056 ± 0.0022 | 0.0010 ± 0.0000 | 400 |" in outcome.table
+    for path in (*outcome.figures, *outcome.files):
+        assert path.stat().st_size > 0
+    assert json.loads((tmp_path / "trials.json").read_text())["trials"] == [small]
+
+
+def test_a_trial_of_the_grasp_in_small(demonstrator):
+    result = grasp.trial(0, n_episodes=10, duration=0.4)
+    assert set(published.GRASP) < set(result["direct"])
+    json.dumps(result)
+
+
+def test_one_data_set_of_the_posture_reaches_the_published_figure(tmp_path):
+    outcome = posture.reproduce(tmp_path, trials=1, console=Console(quiet=True))
+    result = json.loads((tmp_path / "trials.json").read_text())["trials"][0]
+    assert result["inconsistency"]["nUPE"] <= published.POSTURE_NUPE["inconsistency"][0]
+    assert result["direct"]["nUPE"] > 50 * result["inconsistency"]["nUPE"]
+    assert result["movements that meet the wall"] > 0.9
+    assert "0.00291 ± 0.00313" in outcome.table
+    for path in (*outcome.figures, *outcome.files):
+        assert path.stat().st_size > 0
+
+
+def test_posture_demonstrations_obey_wall_and_limits():
+    humanoid = OUR_OWN.humanoid()
+    D, blocked = posture.demonstrate(humanoid, 4, 40, random_state=0)
+    np.testing.assert_allclose(D.actions, np.einsum("nij,nj->ni", D.projections, D.policy), atol=1e-12)
+    np.testing.assert_allclose(D.projections @ D.projections, D.projections, atol=1e-9)
+    np.testing.assert_allclose(D.policy, -0.1 * (D.states - humanoid.outstretched))
+    low, high = humanoid.robot.limits.T
+    assert ((low <= D.states) & (D.states <= high)).all()
+    assert 0 < blocked.mean() < 1
+    again, _ = posture.demonstrate(humanoid, 4, 40, random_state=0)
+    np.testing.assert_array_equal(D.states, again.states)
+
+
+def test_a_real_robot_by_path_learns_one_short_data_set():
+    files = importlib.metadata.files("example-robot-data") or []
+    found = [file for file in files if file.name == "g1_29dof_rev_1_0.urdf"]
+    if not found:
+        pytest.skip("example-robot-data has no G1")
+    choice = RobotChoice.of(
+        Path(str(found[0].locate())),
+        "waist_roll_joint,waist_pitch_joint",
+        "left_rubber_hand,right_rubber_hand",
+        "left_ankle_roll_link,right_ankle_roll_link",
+    )
+    D, _ = posture.demonstrate(choice.humanoid(), 2, 5, random_state=0)
+    assert D.states.shape == (10, 27)
+    recording, _ = grasp.training(Demonstrator(choice.humanoid()), 0, n=2, duration=0.2)
+    assert recording.tracking < 0.01
+    assert recording.demonstrations.actions.any(axis=1).all()
+
+
+def test_pictures_of_the_robot(tmp_path, demonstrator, policies):
+    try:
+        frame = next(grasp_video.frames(demonstrator, {"expert": policies["expert"]}))
+    except NoOpenGL:
+        pytest.skip("no OpenGL")
+    assert frame.shape == (576, 480, 3)
+    # The ball is orange, and in the picture.
+    red, green, blue = frame.reshape(-1, 3).astype(int).T
+    assert np.count_nonzero((red > 150) & (green < 130) & (blue < 60)) > 200
+    with pytest.raises(uc.errors.UnconstrainError, match=r"end the name in \.mp4"):
+        grasp_video.write(tmp_path / "grasp.gif", demonstrator, policies)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_opengl_a_sentence_and_the_other_figures(
+    tmp_path, monkeypatch, demonstrator, recorded, policies
+):
+    def missing(*_, **__):
+        raise NoOpenGL("there is no OpenGL to draw with here")
+
+    monkeypatch.setattr(grasp_figures, "Camera", missing)
+    pictures = grasp_figures.write(tmp_path, demonstrator, *recorded, policies)
+    assert [path.name for path in pictures.shown] == ["fig6.png"]
+    assert "no OpenGL" in pictures.left_out[0]
+
+
+def test_the_viewer_s_loop_follows_keys(demonstrator, monkeypatch):
+    loop = grasp_viewer.Interaction(demonstrator, demonstrator.policy)
+    before = loop.body.hands
+    loop.press(grasp_viewer.UP)
+    loop.press(grasp_viewer.LEFT)
+    assert loop.width == pytest.approx(0.27)
+    assert loop.aside == pytest.approx(0.02)
+    loop.step()
+    assert np.linalg.norm(loop.body.hands - before) > 1e-3
+    loop.press(ord("B"))
+    assert loop.obstacle is None
+    loop.press(ord("R"))
+    loop.step()
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(grasp_viewer.sys, "platform", "linux")
+    with pytest.raises(uc.errors.UnconstrainError, match="no display"):
+        grasp_viewer.view(demonstrator, demonstrator.policy)

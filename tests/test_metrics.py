@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import unconstrain as uc
+from tests.problems import problems
+from unconstrain import metrics as risk
+from unconstrain.fitting.observation import RISKS, moving, sight
+
+
+@given(problems(), st.floats(-3, 3))
+def test_inconsistency_is_below_cpe_is_below_upe(problem, exponent):
+    _, Pi, N, U, rng = problem
+    P = Pi + rng.normal(size=Pi.shape) * 10.0**exponent
+    scale = np.mean(Pi**2) + np.mean(P**2)
+    e_i, cpe, upe = (
+        risk.inconsistency(U, P),
+        risk.constrained_policy_error(Pi, P, N),
+        risk.unconstrained_policy_error(Pi, P),
+    )
+    assert e_i <= cpe + 1e-12 * scale
+    assert cpe <= upe + 1e-12 * scale
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_in_the_plane_with_one_constraint_inconsistency_equals_cpe(seed):
+    rng = np.random.default_rng(seed)
+    Pi, P = rng.normal(size=(2, 50, 2))
+    N = uc.constraints.projection(rng.normal(size=(50, 1, 2)))
+    U = np.einsum("nij,nj->ni", N, Pi)
+    np.testing.assert_allclose(risk.inconsistency(U, P), risk.constrained_policy_error(Pi, P, N), rtol=1e-9)
+
+
+@given(problems())
+def test_the_true_policy_has_no_inconsistency(problem):
+    _, Pi, _, U, _ = problem
+    assert risk.inconsistency(U, Pi) <= 1e-20 * np.sum(Pi**2)
+
+
+@given(problems())
+def test_every_risk_is_what_its_sight_sees(problem):
+    _, Pi, N, U, rng = problem
+    P = Pi + rng.normal(size=Pi.shape)
+    expected = {
+        "inconsistency": risk.inconsistency(U, P),
+        "direct": risk.direct(U, P),
+        "constrained": risk.constrained_policy_error(Pi, P, N),
+        "auto": risk.auto(U, P, N),
+    }
+    for name in RISKS:
+        seen = sight(name, U, N)
+        error = np.mean(np.sum((seen.targets - np.einsum("nkd,nd->nk", seen.rows, P)) ** 2, axis=1))
+        np.testing.assert_allclose(error, expected[name], rtol=1e-7, atol=1e-12 * np.mean(P**2))
+
+
+def test_blocked_samples_have_no_direction_even_where_rounding_leaves_one():
+    U = np.array([[1.0, 0.0], [0.0, 0.0], [1e-17, -1e-17]])
+    assert moving(U).tolist() == [True, False, False]
+    assert risk.inconsistency(U, np.array([[1.0, 5.0], [7.0, 7.0], [7.0, 7.0]])) == 0.0
+
+
+def test_normalised_by_the_variance_of_the_true_policy():
+    Pi = np.array([[0.0, 0.0], [2.0, 4.0]])
+    assert risk.normalized(2.5, Pi) == 0.5  # variances 1 and 4
+    with pytest.raises(uc.errors.DataError, match="the same at every sample"):
+        risk.normalized(1.0, np.ones((3, 2)))
+
+
+def test_shapes_that_do_not_match_are_told():
+    with pytest.raises(uc.errors.DataError, match=r"actions \(3, 2\) and predictions \(4, 2\)"):
+        risk.inconsistency(np.ones((3, 2)), np.ones((4, 2)))
+    with pytest.raises(uc.errors.DataError, match=r"projections must have shape \(3, 2, 2\)"):
+        risk.constrained_policy_error(np.ones((3, 2)), np.ones((3, 2)), np.eye(2))

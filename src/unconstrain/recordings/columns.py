@@ -1,0 +1,66 @@
+"""Which column of a recording is what."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from unconstrain.errors import DataError
+
+Key = str | int
+"""A column's name, or its position counted from 0."""
+
+Keys = Key | Sequence[Key]
+
+DIFFERENTIATE = "differentiate"
+"""What `action` is where the actions are the derivative of the states."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The roles that columns of a recording play, by name or by position.
+
+    A column of lists, or an array of several columns, stands for all its components, of which `name[3]` is one.
+
+    Parameters
+    ----------
+    state : column, or list of columns
+        The states x. Files written by this package, and LeRobot datasets, know theirs.
+    action : column, or list of columns
+        The actions u, or "differentiate". Without it the states are differentiated, which needs `time`.
+    time : column
+        The time of each sample: seconds, or another unit (see `time_unit`), or timestamps. It increases strictly within
+        an episode.
+    episode : column
+        Its values, of any type, tell episodes apart. Without it every file is an episode.
+    force : column, or list of columns
+        The contact force, one column for each action, in any unit; see `force_threshold`.
+    free : column
+        1 where nothing constrained the motion, else 0.
+    projections : column, or list of columns
+        The nullspace projection of each sample: one column of lists of d² numbers, row by row, or d² columns. Empty or
+        NaN where it is not known.
+
+    Raises
+    ------
+    DataError
+        `projections` is given together with `force` or `free`, or other columns without `state`.
+    """
+
+    state: Keys | None = None
+    action: Keys | None = None
+    time: Key | None = None
+    episode: Key | None = None
+    force: Keys | None = None
+    free: Key | None = None
+    projections: Keys | None = None
+
+    def __post_init__(self) -> None:
+        if self.projections is not None and not (self.force is self.free is None):
+            other = "force" if self.force is not None else "free"
+            raise DataError(
+                f"projections= and {other}= both say what the constraints are: leave out one of them"
+            )
+
+    @property
+    def differentiated(self) -> bool:
+        """Whether the actions are the derivative of the states."""
+        return self.action is None or self.action == DIFFERENTIATE

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.diagnostics import identifiability
-from unconstrain.features.centers import activations
 from unconstrain.policies import LocallyLinearPolicy
+from unconstrain.receptive import activations
 from unconstrain.recordings import load
 
 Array = NDArray[np.float64]

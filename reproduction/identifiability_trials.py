@@ -14,7 +14,7 @@ from unconstrain import limit_cycle as toy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics import identifiability
 from unconstrain.features import DecoupledFeatures
-from unconstrain.fitting.observation import directions
+from unconstrain.motion import directions
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
 from unconstrain.robots.task import TaskConstraint

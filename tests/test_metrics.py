@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 import unconstrain as uc
 from tests.problems import problems
 from unconstrain import metrics as risk
-from unconstrain.fitting.observation import RISKS, moving, sight
+from unconstrain.fitting.observation import RISKS, sight
+from unconstrain.motion import moving
 
 
 @given(problems(), st.floats(-3, 3))

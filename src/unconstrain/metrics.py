@@ -28,7 +28,8 @@ import numpy as np
 
 from unconstrain.arrays import check_actions, check_projections
 from unconstrain.errors import DataError
-from unconstrain.fitting.observation import directions, errors, sight
+from unconstrain.fitting.observation import errors, sight
+from unconstrain.motion import directions
 
 
 def inconsistency(U, P) -> float:

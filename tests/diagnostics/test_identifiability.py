@@ -14,8 +14,8 @@ from unconstrain import limit_cycle as toy
 from unconstrain.cli.app import app
 from unconstrain.diagnostics.information import of_recordings
 from unconstrain.diagnostics.spectrum import directions
-from unconstrain.fitting.observation import moving
 from unconstrain.fitting.posterior import Unsure
+from unconstrain.motion import moving
 
 
 def policies(X):

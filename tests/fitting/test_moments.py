@@ -6,11 +6,11 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from tests.problems import problems
 from unconstrain.features import FullFeatures
-from unconstrain.features.centers import activations
 from unconstrain.fitting import accumulate as accumulation
 from unconstrain.fitting.accumulate import local_moments, parametric_moments
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS, sight
+from unconstrain.receptive import activations
 
 
 class Rows:

@@ -10,8 +10,8 @@ from sklearn.preprocessing import PolynomialFeatures
 import unconstrain as uc
 from tests.problems import problems
 from unconstrain import limit_cycle as toy
-from unconstrain.fitting.observation import directions
 from unconstrain.fitting.posterior import Posterior
+from unconstrain.motion import directions
 
 NINETY = 1.6448536269514722
 

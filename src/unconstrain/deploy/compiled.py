@@ -28,7 +28,7 @@ from numpy import add, divide, exp, multiply, ndarray, subtract
 
 from unconstrain import atomic
 from unconstrain.errors import PolicyError, PolicyFileError
-from unconstrain.features.centers import normalized_activations
+from unconstrain.receptive import normalized_activations
 
 FORMAT = 1
 BLOCK_ROWS = 4096

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unconstrain.features.centers import normalized_activations
 from unconstrain.fitting.kernels.products import distinct_products, pairs
-from unconstrain.fitting.observation import directions
+from unconstrain.motion import directions
 from unconstrain.parallel import blocks
+from unconstrain.receptive import normalized_activations
 
 NUMBERS_IN_BLOCK = 2**22
 

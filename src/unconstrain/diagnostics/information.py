@@ -19,11 +19,12 @@ import numpy as np
 from unconstrain.arrays import check_actions, check_projections, check_states, check_weights
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features import FullFeatures, NormalizedRBF
-from unconstrain.features.centers import activations
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import informative, moving, sight
+from unconstrain.fitting.observation import informative, sight
+from unconstrain.motion import moving
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.receptive import activations
 
 
 @dataclass(frozen=True)

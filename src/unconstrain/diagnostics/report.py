@@ -24,13 +24,14 @@ from unconstrain.diagnostics.information import Information
 from unconstrain.diagnostics.spectrum import THRESHOLD, shares_seen
 from unconstrain.diagnostics.words import described
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.features.centers import activations, farthest_first
+from unconstrain.features.centers import farthest_first
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import directions as units
 from unconstrain.fitting.observation import sight
 from unconstrain.fitting.posterior import Posterior
+from unconstrain.motion import directions as units
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.receptive import activations
 
 POOL = 200
 """Candidate states for the next recording, spread over the recorded ones, where none are given."""

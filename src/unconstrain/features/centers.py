@@ -5,42 +5,16 @@ order of the samples, so neither does a policy built on it.
 """
 
 import numpy as np
-from scipy.spatial.distance import cdist
 from sklearn.cluster import KMeans
 
 from unconstrain.arrays import check_choice, check_finite
 from unconstrain.errors import PolicyError
+from unconstrain.receptive import squared_distances
 
 PLACEMENTS = ("grid", "kmeans", "coverage")
 
 # Neighbouring centres then overlap at exp(-1/(2 * 1.5²)) = 0.80 of their height: smooth, still well conditioned.
 WIDTH_PER_SPACING = 1.5
-
-
-def squared_distances(X: np.ndarray, centers: np.ndarray) -> np.ndarray:
-    """`‖x - c‖²` for states X (N, n) and centers (M, n): (N, M)."""
-    return cdist(X, centers, "sqeuclidean")
-
-
-def activations(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
-    """`exp(-‖x - c‖² / 2σ²)`: (N, M)."""
-    exponent = squared_distances(X, centers)
-    exponent *= -0.5 / width**2
-    return np.exp(exponent, out=exponent)
-
-
-def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
-    """Activations divided by their sum over the centres: (N, M), rows sum to one.
-
-    The nearest centre's exponent is taken out first, so the result is right however far x is from all centres,
-    where every activation by itself would underflow to zero.
-    """
-    exponent = squared_distances(X, centers)
-    exponent -= exponent.min(axis=1, keepdims=True)
-    exponent *= -0.5 / width**2
-    np.exp(exponent, out=exponent)
-    exponent /= exponent.sum(axis=1, keepdims=True)
-    return exponent
 
 
 def place(

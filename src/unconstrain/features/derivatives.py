@@ -14,8 +14,8 @@ import numpy as np
 from sklearn.preprocessing import PolynomialFeatures, SplineTransformer
 
 from unconstrain.errors import PolicyError
-from unconstrain.features.centers import normalized_activations
 from unconstrain.features.rbf import NormalizedRBF
+from unconstrain.receptive import normalized_activations
 
 BASES = (NormalizedRBF, SplineTransformer, PolynomialFeatures)
 EXTRAPOLATIONS = ("constant", "linear", "continue")

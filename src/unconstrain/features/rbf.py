@@ -5,7 +5,8 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_number, check_states, check_weights
-from unconstrain.features.centers import normalized_activations, place
+from unconstrain.features.centers import place
+from unconstrain.receptive import normalized_activations
 
 
 class NormalizedRBF(TransformerMixin, BaseEstimator):

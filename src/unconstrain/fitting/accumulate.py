@@ -14,12 +14,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from unconstrain.features import FullFeatures, PolicyFeatures
-from unconstrain.features.centers import activations
 from unconstrain.features.full import with_one
 from unconstrain.fitting.kernels.products import distinct_products, n_pairs, pair_index, pairs
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Sight
 from unconstrain.parallel import blocks, shared_out
+from unconstrain.receptive import activations
 
 # Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
 # in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.

@@ -9,32 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
+from unconstrain.motion import NO_MOTION, lengths
+
 RISKS = ("auto", "inconsistency", "direct", "constrained")
-
-# An action this much shorter than the longest one is rounding left by a projection that blocked all motion:
-# its direction is noise, and would be taught as truth.
-NO_MOTION = 1e-12
-
-
-def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
-    """Which actions (N, d) have a direction, as a mask (N,): those longer than `NO_MOTION` times `scale`.
-
-    `scale` is the longest action's length, in the action's unit, where it is known from elsewhere.
-    """
-    r = lengths(U)
-    return r > NO_MOTION * (r.max(initial=0.0) if scale is None else scale)
-
-
-def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions `û` (N, d) and lengths `r` (N,) of actions U (N, d); both zero where an action is zero."""
-    seen = _along_motion(U)
-    return seen.rows[:, 0], seen.lengths
-
-
-def lengths(U: np.ndarray) -> np.ndarray:
-    """`‖u‖`, (N,), of actions U (N, d), in double precision whatever theirs is."""
-    squares = np.einsum("nd,nd->n", U, U, dtype=np.float64)
-    return np.sqrt(squares, out=squares)
 
 
 class Sight(Protocol):

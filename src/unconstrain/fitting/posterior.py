@@ -27,9 +27,9 @@ from scipy.optimize import elementwise
 
 from unconstrain.arrays import check_number
 from unconstrain.features import FullFeatures, PolicyFeatures
-from unconstrain.features.centers import normalized_activations
 from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.fitting.moments import Moments
+from unconstrain.receptive import normalized_activations
 
 # Where λ is searched, relative to the largest eigenvalue of H, and at how many values before the search is refined.
 SMALLEST, LARGEST, N_TRIED = 1e-14, 1e6, 41

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import NO_MOTION
+from unconstrain.motion import NO_MOTION
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from unconstrain import atomic
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError, UnconstrainError
-from unconstrain.fitting.observation import directions
+from unconstrain.motion import directions
 
 Array = NDArray[np.float64]
 

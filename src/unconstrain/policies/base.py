@@ -24,18 +24,10 @@ from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting import solve as selection
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import (
-    NO_MOTION,
-    RISKS,
-    Sight,
-    informative,
-    lengths,
-    moving,
-    sight,
-    unknown,
-)
+from unconstrain.fitting.observation import RISKS, Sight, informative, sight, unknown
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.fitting.tally import Tally
+from unconstrain.motion import NO_MOTION, lengths, moving
 from unconstrain.policies import persistence
 
 NO_DIRECTION = (

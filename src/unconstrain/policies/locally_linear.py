@@ -3,12 +3,13 @@
 import numpy as np
 
 from unconstrain.arrays import check_number
-from unconstrain.features.centers import normalized_activations, place
+from unconstrain.features.centers import place
 from unconstrain.fitting.accumulate import local_moments
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Sight
 from unconstrain.fitting.posterior import Posterior, local_covariance
 from unconstrain.policies.base import Policy
+from unconstrain.receptive import normalized_activations
 
 BLOCK_ROWS = 4096
 

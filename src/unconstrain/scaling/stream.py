@@ -22,8 +22,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from unconstrain import atomic
 from unconstrain.arrays import check_samples
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.fitting.observation import moving
 from unconstrain.fitting.tally import Tally
+from unconstrain.motion import moving
 from unconstrain.policies.base import NO_DIRECTION, Policy
 from unconstrain.progress import Report, reporting
 from unconstrain.recordings import dataset

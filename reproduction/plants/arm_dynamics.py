@@ -20,7 +20,7 @@ from reproduction.plants import arm
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
-from unconstrain.recordings import differentiate
+from unconstrain.recordings.differentiate import differentiate
 from unconstrain.robots.robot import Robot, simulator
 
 Array = NDArray[np.float64]

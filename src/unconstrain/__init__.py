@@ -1,33 +1,37 @@
 """Learn the policy behind constrained demonstrations.
 
+Everything below is imported when it is first used, so that importing the package costs next to nothing.
+
 >>> import unconstrain as uc
 >>> demos = uc.load("wipe.csv", state=["x", "y", "z"], time="t", episode="run")   # doctest: +SKIP
->>> policy = uc.LocallyLinearPolicy(alpha="cv")                                     # doctest: +SKIP
->>> policy.fit(demos.states, demos.actions, groups=demos.episodes)                  # doctest: +SKIP
+>>> policy = uc.LocallyLinearPolicy()                                               # doctest: +SKIP
+>>> policy.fit(demos)                                                               # doctest: +SKIP
 """
 
-from importlib.metadata import version
+from typing import TYPE_CHECKING
 
-from unconstrain import constraints, errors, features
-from unconstrain import metrics as risk
-from unconstrain.constraints.learnt import (
-    ConstantConstraint,
-    ConstraintChain,
-    FeatureConstraint,
-    NullspaceComponent,
-    load_constraint,
-)
-from unconstrain.demonstrations import Demonstrations
-from unconstrain.diagnostics import identifiability
-from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
-from unconstrain.fitting import moments
-from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
-from unconstrain.recordings import load, save
-from unconstrain.scaling import cluster as distributed
-from unconstrain.scaling.stream import fit_stream
-from unconstrain.selection import select_policy
+from unconstrain import lazy
 
-__version__ = version("unconstrain")
+if TYPE_CHECKING:
+    from unconstrain import constraints, errors, features, metrics, plot, robots
+    from unconstrain.constraints.learnt import (
+        ConstantConstraint,
+        ConstraintChain,
+        FeatureConstraint,
+        NullspaceComponent,
+        load_constraint,
+    )
+    from unconstrain.demonstrations import Demonstrations
+    from unconstrain.diagnostics import identifiability
+    from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
+    from unconstrain.fitting import moments
+    from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
+    from unconstrain.recordings import load, save
+    from unconstrain.scaling import cluster as distributed
+    from unconstrain.scaling.stream import fit_stream
+    from unconstrain.selection import select_policy
+
+    __version__: str
 
 __all__ = [
     "ConstantConstraint",
@@ -50,8 +54,42 @@ __all__ = [
     "load_compiled",
     "load_constraint",
     "load_policy",
+    "metrics",
     "moments",
-    "risk",
+    "plot",
+    "robots",
     "save",
     "select_policy",
 ]
+
+_HOMES = {
+    "unconstrain.constraints.learnt": (
+        "ConstantConstraint",
+        "ConstraintChain",
+        "FeatureConstraint",
+        "NullspaceComponent",
+        "load_constraint",
+    ),
+    "unconstrain.demonstrations": ("Demonstrations",),
+    "unconstrain.diagnostics": ("identifiability",),
+    "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
+    "unconstrain.policies": ("LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"),
+    "unconstrain.recordings": ("load", "save"),
+    "unconstrain.scaling.stream": ("fit_stream",),
+    "unconstrain.selection": ("select_policy",),
+    "unconstrain.version": ("__version__",),
+}
+
+_NAMESPACES = {
+    "constraints": "unconstrain.constraints",
+    "distributed": "unconstrain.scaling.cluster",
+    "errors": "unconstrain.errors",
+    "features": "unconstrain.features",
+    "metrics": "unconstrain.metrics",
+    "moments": "unconstrain.fitting.moments",
+    "plot": "unconstrain.plot",
+    "robots": "unconstrain.robots",
+}
+
+if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours
+    __getattr__, __dir__ = lazy.attach(__name__, _HOMES, _NAMESPACES)

@@ -5,7 +5,6 @@ order of the samples, so neither does a policy built on it.
 """
 
 import numpy as np
-from sklearn.cluster import KMeans
 
 from unconstrain.arrays import check_choice, check_finite
 from unconstrain.errors import PolicyError
@@ -72,6 +71,8 @@ def grid(X: np.ndarray, n_centers: int) -> np.ndarray:
 
 def kmeans(X: np.ndarray, n_centers: int, sample_weight=None, random_state=None) -> np.ndarray:
     """Cluster means (scikit-learn's `KMeans`), of the states sorted first so that their order does not matter."""
+    from sklearn.cluster import KMeans  # slow to import
+
     order = np.lexsort(X.T)
     X = X[order]
     distinct = 1 + np.count_nonzero(np.any(X[1:] != X[:-1], axis=1))

@@ -2,8 +2,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
 
 from unconstrain.errors import DataError
 
@@ -44,6 +42,9 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
     DataError
         The window is longer than the episode, or time does not increase strictly.
     """
+    from scipy.interpolate import CubicSpline  # slow to import, and most recordings have actions
+    from scipy.signal import savgol_filter
+
     X, t = np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64)
     if X.ndim != 2 or t.shape != (len(X),):
         raise DataError(f"states (N, n) and time (N,) are needed, got shapes {X.shape} and {t.shape}")

@@ -46,7 +46,7 @@ def test_type_checkers_are_told_of_the_same_names(name):
 
 
 def test_star_import_gives_the_public_names():
-    code = "from unconstrain import *; import unconstrain; print(all(name in globals() for name in unconstrain.__all__))"
+    code = "from unconstrain import *; import unconstrain as uc; print(all(name in globals() for name in uc.__all__))"
     assert _python(code) == "True"
 
 

@@ -1,3 +1,5 @@
+"""Laws of the errors, whatever the policy, the constraints and the unit."""
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ import unconstrain as uc
 from tests.problems import problems
 from unconstrain import metrics as risk
 from unconstrain.fitting.observation import RISKS, sight
-from unconstrain.motion import moving
+from unconstrain.motion import directions, lengths, moving
 
 
 @given(problems(), st.floats(-3, 3))
@@ -47,7 +49,7 @@ def test_every_risk_is_what_its_sight_sees(problem):
         "inconsistency": risk.inconsistency(U, P),
         "direct": risk.direct(U, P),
         "constrained": risk.constrained_policy_error(Pi, P, N),
-        "auto": risk.auto(U, P, N),
+        "auto": risk.inconsistency(U, P, N),
     }
     for name in RISKS:
         seen = sight(name, U, N)
@@ -73,3 +75,59 @@ def test_shapes_that_do_not_match_are_told():
         risk.inconsistency(np.ones((3, 2)), np.ones((4, 2)))
     with pytest.raises(uc.errors.DataError, match=r"projections must have shape \(3, 2, 2\)"):
         risk.constrained_policy_error(np.ones((3, 2)), np.ones((3, 2)), np.eye(2))
+
+
+@given(problems(), st.floats(0, 1))
+def test_projections_not_known_leave_the_inconsistency_as_it_is(problem, share):
+    _, Pi, N, U, rng = problem
+    P = Pi + rng.normal(size=Pi.shape)
+    plain = risk.inconsistency(U, P)
+    np.testing.assert_array_equal(risk.inconsistency(U, P, np.full_like(N, np.nan)), plain)
+    hidden = rng.random(len(N)) < share
+    known = np.where(hidden[:, None, None], np.nan, N)
+    by_sample = np.where(
+        hidden,
+        [risk.inconsistency(u[None], p[None]) for u, p in zip(U, P, strict=True)],
+        [risk.constrained_policy_error(u[None], p[None], n[None]) for u, p, n in zip(U, P, N, strict=True)],
+    )
+    # One by one a sample has no longest action beside it, so rounding left by a projection would count as motion.
+    by_sample[hidden & ~moving(U)] = 0.0
+    np.testing.assert_allclose(risk.inconsistency(U, P, known), by_sample.mean(), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-200, 1.0, 1e160, 1e300])
+def test_the_share_explained_does_not_depend_on_the_unit(scale):
+    rng = np.random.default_rng(0)
+    U = rng.normal(size=(50, 2))
+    P = U + 0.1 * rng.normal(size=(50, 2))
+    assert uc.metrics.explained(scale * U, scale * P) == pytest.approx(uc.metrics.explained(U, P))
+    assert uc.metrics.explained(scale * U, scale * U) == pytest.approx(1.0)
+
+
+def test_lengths_are_right_where_squares_are_not():
+    U = np.array([[3e200, 4e200], [3e-200, 4e-200], [3.0, 4.0], [0.0, 0.0]])
+    np.testing.assert_allclose(lengths(U), [5e200, 5e-200, 5.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(lengths(U[1:2]), [5e-200], rtol=1e-12)
+    assert moving(np.array([[1.0], [1e300]])).tolist() == [False, True]
+    np.testing.assert_allclose(directions(1e-320 * np.ones((1, 1)))[0], [[1.0]])
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: risk.explained(np.zeros((3, 2)), np.ones((3, 2))), "all actions are zero"),
+        (
+            lambda: risk.explained(1e-200 * np.ones((3, 2)), np.ones((3, 2))),
+            "so much larger than the actions",
+        ),
+        (
+            lambda: risk.direct(1e160 * np.ones((3, 2)), np.ones((3, 2))),
+            "actions and predictions reach 1e\\+160",
+        ),
+        (lambda: risk.normalized(1.0, 1e-200 * np.eye(2)), "true policy's actions reach 1e-200"),
+        (lambda: risk.inconsistency(np.empty((0, 2)), np.empty((0, 2))), "no samples"),
+    ],
+)
+def test_what_cannot_be_measured_is_told(call, sentence):
+    with pytest.raises(uc.errors.DataError, match=sentence):
+        call()

@@ -92,7 +92,7 @@ def test_leaving_a_fold_out_of_the_sums_is_fitting_without_it(policy, episodic, 
     assert table["it"].inconsistency == pytest.approx(
         uc.metrics.inconsistency(U[rows], predictions), rel=1e-6
     )
-    assert table["it"].explained == pytest.approx(selection.explained(U[rows], predictions))
+    assert table["it"].explained == pytest.approx(uc.metrics.explained(U[rows], predictions))
 
 
 @pytest.mark.parametrize("n_episodes", [2, 3])

@@ -69,7 +69,7 @@ def check_samples(estimator, X, y, *, reset: bool, min_samples: int = 1) -> tupl
 
 
 def check_numbers(array, name: str) -> np.ndarray:
-    """An array of float64, of any shape. Raises `DataError` for text, and for rows of different lengths."""
+    """Make an array of float64, of any shape. Raises `DataError` for text, and for rows of different lengths."""
     try:
         return np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -152,7 +152,7 @@ def check_groups(groups, n_samples: int) -> np.ndarray | None:
 
 
 def check_number(value, name: str, *, positive: bool) -> float:
-    """A finite number, above zero where `positive`, else at least zero. Raises `PolicyError` otherwise."""
+    """Check for a finite number, above zero where `positive`, else at least zero. Raises `PolicyError` otherwise."""
     wanted = "above zero" if positive else "of at least zero"
     try:
         number = float(value)

@@ -1,109 +1,244 @@
-"""What a policy is measured by: risks that differ only in the projection before the error.
+"""Errors and scores of policies and constraints: mean squared errors that differ only in the projection before them.
 
-Every risk here is a mean over samples of a squared error behind a projection,
+With predictions `p_n` of a model, every error here is a mean over samples,
 
-    E = 1/N Σ_n ‖Q_n (u_n - p_n)‖²,        p_n = model(x_n),
+    E = 1/N Σ_n ‖Q_n (u_n - p_n)‖²,
 
-where the rows of `Q_n` (k x d) say what of the action is looked at:
+where the rows of `Q_n` (k x d) are the directions of the action in which the two are compared:
 
-| risk          | Q_n            | error of a sample        | needs            |
-| ------------- | -------------- | ------------------------ | ---------------- |
-| direct        | I              | ‖u_n - p_n‖²             | data             |
-| constrained   | N_n            | ‖u_n - N_n p_n‖²         | true projections |
-| inconsistency | û_nᵀ           | (r_n - û_nᵀ p_n)²        | data             |
-| auto          | N_n or û_nᵀ    | whichever is known       | some projections |
+| error                            | Q_n          | error of a sample     | needs                            |
+| -------------------------------- | ------------ | --------------------- | -------------------------------- |
+| `direct`                         | I            | ‖u_n - p_n‖²          | recordings                       |
+| `inconsistency`                  | û_nᵀ         | (r_n - û_nᵀ p_n)²     | recordings                       |
+| `inconsistency`, some N_n known  | N_n or û_nᵀ  | either of the two     | recordings and some projections  |
+| `constrained_policy_error`       | N_n          | ‖N_n (π_n - p_n)‖²    | true policy and projections      |
+| `unconstrained_policy_error`     | I            | ‖π_n - p_n‖²          | true policy                      |
 
-with `r = ‖u‖` and `û = u / r`. `û ûᵀ` projects onto a line that surely lies in the image of the unknown
-`N`, so the true policy has no inconsistency, whatever the constraints were. "auto" uses the projection of every
-sample whose constraint is known (measured, computed, learnt) and the line of every other. For every model
+with `r = ‖u‖` and `û = u / r`. The line `û ûᵀ` lies in the image of the unknown `N`, so the true policy has no
+inconsistency, whatever the constraints were. For every model
 
-    inconsistency <= auto <= constrained policy error <= unconstrained policy error.
-
-What is known of a sample that does not move counts as well: `N pi = 0` there. Without it there is nothing to see.
+    inconsistency <= inconsistency with known projections <= constrained policy error <= unconstrained policy error.
 
 Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) to (7).
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from unconstrain.arrays import check_actions, check_projections
 from unconstrain.errors import DataError
-from unconstrain.fitting.observation import errors, sight
-from unconstrain.motion import directions
+from unconstrain.motion import SQUARABLE, directions
+
+__all__ = [
+    "constrained_policy_error",
+    "direct",
+    "explained",
+    "inconsistency",
+    "normalized",
+    "projected_observation_error",
+    "projected_policy_error",
+    "unconstrained_policy_error",
+]
 
 
-def inconsistency(U, P) -> float:
-    """Mean inconsistency `1/N Σ (r_n - û_nᵀ p_n)²` of predictions P (N, d) with actions U (N, d).
+def inconsistency(U: ArrayLike, P: ArrayLike, projections: ArrayLike | None = None) -> float:
+    """Compare predictions with actions in the directions that were surely free: the mean inconsistency.
 
-    In squared units of the action. Zero actions have no direction: they add nothing to the sum and are
-    counted in N, so that `inconsistency <= constrained_policy_error` holds for every model and data.
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+    projections : array_like of shape (N, d, d), optional
+        Nullspace projections. A sample whose projection is known contributes `‖N (u - p)‖²`, which asks more of the
+        model than its direction does; a sample whose projection is not known is all NaN here.
+
+    Returns
+    -------
+    float
+        `1/N Σ (r_n - û_nᵀ p_n)²`, in squared units of the action.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, or a matrix is no projection.
+
+    Notes
+    -----
+    Actions of zero length have no direction. They add nothing to the sum, unless their projection is known, and are
+    counted in N: so the inconsistency is never above the constrained policy error.
     """
-    U, P = _pair(U, P, "actions", "predictions")
+    U, P = _check_pair(U, P, "actions", "predictions")
     unit, r = directions(U)
-    return float(np.mean((r - np.einsum("nd,nd->n", unit, P)) ** 2))
+    error = (r - np.einsum("nd,nd->n", unit, P)) ** 2
+    if projections is not None:
+        N = check_projections(projections, *U.shape, unknown=True)
+        known = ~np.isnan(N).any(axis=(1, 2))
+        error[known] = _squares(np.einsum("nij,nj->ni", N[known], U[known] - P[known]))
+    return float(np.mean(error))
 
 
-def direct(U, P) -> float:
-    """Mean direct risk `1/N Σ ‖u_n - p_n‖²`, what ordinary regression minimises. U, P (N, d)."""
-    U, P = _pair(U, P, "actions", "predictions")
-    return float(np.mean(np.sum((U - P) ** 2, axis=1)))
+def direct(U: ArrayLike, P: ArrayLike) -> float:
+    """Compare predictions with whole actions: the mean squared error that ordinary regression minimises.
 
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
 
-def auto(U, P, N) -> float:
-    """Mean risk of what is known, `1/N Σ ‖Q_n (u_n - p_n)‖²`: Q is the projection, or ûᵀ where that is not known.
+    Returns
+    -------
+    float
+        `1/N Σ ‖u_n - p_n‖²`, in squared units of the action.
 
-    In squared units of the action. U (N, d) actions, P (N, d) predictions, N (N, d, d) projections, those not known
-    all NaN. Zero actions whose projection is not known add nothing, and are counted, as in `inconsistency`.
+    Raises
+    ------
+    DataError
+        If shapes do not match or entries are not finite.
     """
-    U, P = _pair(U, P, "actions", "predictions")
-    seen = sight("auto", U, check_projections(N, *U.shape, unknown=True))
-    return float(np.mean(errors(seen, P)))
+    U, P = _check_pair(U, P, "actions", "predictions")
+    return float(np.mean(_squares(U - P)))
 
 
-def constrained_policy_error(Pi, P, N) -> float:
-    """CPE, `1/N Σ ‖N_n (pi_n - p_n)‖²`: the error that shows under the constraints N (N, d, d).
+def constrained_policy_error(Pi: ArrayLike, P: ArrayLike, N: ArrayLike) -> float:
+    """Compare predictions with the true policy as far as the constraints let it show (CPE).
 
-    Pi (N, d) is the true policy or the constrained action `N pi`, which give the same; P (N, d) predictions.
+    Parameters
+    ----------
+    Pi : array_like of shape (N, d)
+        Actions of the true policy, or the constrained actions `N π`, which give the same.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+    N : array_like of shape (N, d, d)
+        True nullspace projections.
+
+    Returns
+    -------
+    float
+        `1/N Σ ‖N_n (π_n - p_n)‖²`, in squared units of the action.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, or a matrix is no projection.
     """
-    Pi, P = _pair(Pi, P, "the true policy", "predictions")
+    Pi, P = _check_pair(Pi, P, "the true policy", "predictions")
     N = check_projections(N, *Pi.shape)
-    return float(np.mean(np.sum(np.einsum("nij,nj->ni", N, Pi - P) ** 2, axis=1)))
+    return float(np.mean(_squares(np.einsum("nij,nj->ni", N, Pi - P))))
 
 
-def projected_policy_error(Pi, N, learnt) -> float:
-    """PPE, `1/N Σ ‖N_n pi_n - Ñ_n pi_n‖²`: how otherwise than the true constraint a learnt one would bend the policy.
+def unconstrained_policy_error(Pi: ArrayLike, P: ArrayLike) -> float:
+    """Compare predictions with the true policy (UPE).
 
-    Pi (N, d) true policy, N and learnt (N, d, d) true and learnt projections. `normalized(error, Pi)` is the nPPE,
-    `PPE / Σ_j var(pi_j)`. Source: Lin, Howard, Vijayakumar, ICRA 2015.
+    Parameters
+    ----------
+    Pi : array_like of shape (N, d)
+        Actions of the true policy.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+
+    Returns
+    -------
+    float
+        `1/N Σ ‖π_n - p_n‖²`, in squared units of the action.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match or entries are not finite.
+    """
+    Pi, P = _check_pair(Pi, P, "the true policy", "predictions")
+    return float(np.mean(_squares(Pi - P)))
+
+
+def projected_policy_error(Pi: ArrayLike, N: ArrayLike, learnt: ArrayLike) -> float:
+    """Compare what a learnt constraint leaves of the true policy with what the true constraint leaves (PPE).
+
+    Parameters
+    ----------
+    Pi : array_like of shape (N, d)
+        Actions of the true policy.
+    N : array_like of shape (N, d, d)
+        True nullspace projections.
+    learnt : array_like of shape (N, d, d)
+        Learnt nullspace projections.
+
+    Returns
+    -------
+    float
+        `1/N Σ ‖N_n π_n - Ñ_n π_n‖²`, in squared units of the action. ``normalized(error, Pi)`` is the nPPE.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, or a matrix is no projection.
+
+    References
+    ----------
+    Lin, Howard, Vijayakumar, "Learning null space projections", ICRA 2015.
     """
     Pi = check_actions(Pi, "the true policy")
+    _check_squarable("the true policy's actions", Pi)
     N, learnt = check_projections(N, *Pi.shape), check_projections(learnt, *Pi.shape)
-    return float(np.mean(np.sum(np.einsum("nij,nj->ni", N - learnt, Pi) ** 2, axis=1)))
+    return float(np.mean(_squares(np.einsum("nij,nj->ni", N - learnt, Pi))))
 
 
-def projected_observation_error(U, learnt) -> float:
-    """POE, `1/N Σ ‖u_n - Ñ_n u_n‖²`: motion that a learnt constraint would have blocked, though it was seen.
+def projected_observation_error(U: ArrayLike, learnt: ArrayLike) -> float:
+    """Measure the motion that a learnt constraint would have blocked, although it was recorded (POE).
 
-    U (N, d) actions (or their nullspace component), learnt (N, d, d). Needs no truth. `normalized(error, U)` is the
-    nPOE, `POE / Σ_j var(u_j)`. Source: Lin, Howard, Vijayakumar, ICRA 2015.
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions, or their nullspace component.
+    learnt : array_like of shape (N, d, d)
+        Learnt nullspace projections.
+
+    Returns
+    -------
+    float
+        `1/N Σ ‖u_n - Ñ_n u_n‖²`, in squared units of the action. ``normalized(error, U)`` is the nPOE.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, or a matrix is no projection.
+
+    References
+    ----------
+    Lin, Howard, Vijayakumar, "Learning null space projections", ICRA 2015.
     """
     U = check_actions(U)
+    _check_squarable("actions", U)
     learnt = check_projections(learnt, *U.shape)
-    return float(np.mean(np.sum((U - np.einsum("nij,nj->ni", learnt, U)) ** 2, axis=1)))
+    return float(np.mean(_squares(U - np.einsum("nij,nj->ni", learnt, U))))
 
 
-def unconstrained_policy_error(Pi, P) -> float:
-    """UPE, `1/N Σ ‖pi_n - p_n‖²`, of predictions P (N, d) against the true policy Pi (N, d)."""
-    return direct(Pi, P)
+def normalized(error: float, Pi: ArrayLike) -> float:
+    """Express a mean error as a share of the true policy's variance.
 
+    Parameters
+    ----------
+    error : float
+        An error of this module, in squared units of the action.
+    Pi : array_like of shape (N, d)
+        Actions of the true policy; recorded actions may stand for it where it is not known.
 
-def normalized(error: float, Pi) -> float:
-    """`error / Σ_j var(pi_j)`: a mean error as a share of the true policy's variance over the samples Pi (N, d).
+    Returns
+    -------
+    float
+        `error / Σ_j var(π_j)`: the paper's nUPE, nCPE and normalised inconsistency.
 
-    Turns the errors of this module into the paper's nUPE, nCPE and normalised inconsistency. Where the true
-    policy is not known, the actions may stand for it. Raises `DataError` if Pi does not vary.
+    Raises
+    ------
+    DataError
+        If the policy does not vary.
     """
-    variance = float(np.sum(np.var(check_actions(Pi, "the true policy"), axis=0)))
+    Pi = check_actions(Pi, "the true policy")
+    _check_squarable("the true policy's actions", Pi)
+    variance = float(np.sum(np.var(Pi, axis=0)))
     if variance == 0.0:
         raise DataError(
             "the true policy is the same at every sample, so no error can be a share of its variance"
@@ -111,10 +246,63 @@ def normalized(error: float, Pi) -> float:
     return error / variance
 
 
-def _pair(A, B, name_a: str, name_b: str) -> tuple[np.ndarray, np.ndarray]:
+def explained(U: ArrayLike, P: ArrayLike) -> float:
+    """Compute the share of observed motion that predictions explain.
+
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions, of any magnitude.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+
+    Returns
+    -------
+    float
+        `1 - Σ (r - û·p)² / Σ r²`: 1 for a policy consistent with every sample, 0 for one that says "do not move",
+        negative for a policy that is worse than that.
+
+    Raises
+    ------
+    DataError
+        If nothing moves, shapes do not match, or entries are not finite.
+    """
+    U, P = _check_shapes(U, P, "actions", "predictions")
+    largest = np.abs(U).max(initial=0.0)
+    if largest == 0.0:
+        raise DataError("all actions are zero: there is no motion to explain")
+    if np.abs(P).max(initial=0.0) / SQUARABLE > largest:
+        raise DataError(
+            "predictions are so much larger than the actions that their squares cannot be compared"
+        )
+    U, P = U / largest, P / largest
+    return 1.0 - inconsistency(U, P) / float(np.mean(_squares(U)))
+
+
+def _squares(E: np.ndarray) -> np.ndarray:
+    """Compute `‖e‖²` of the rows of E (N, d): (N,)."""
+    return np.einsum("nd,nd->n", E, E)
+
+
+def _check_pair(A: ArrayLike, B: ArrayLike, name_a: str, name_b: str) -> tuple[np.ndarray, np.ndarray]:
+    """Check two arrays (N, d) that are compared in squared units."""
+    A, B = _check_shapes(A, B, name_a, name_b)
+    _check_squarable(f"{name_a} and {name_b}", A, B)
+    return A, B
+
+
+def _check_shapes(A: ArrayLike, B: ArrayLike, name_a: str, name_b: str) -> tuple[np.ndarray, np.ndarray]:
     A, B = check_actions(A, name_a), check_actions(B, name_b)
     if A.shape != B.shape:
         raise DataError(f"{name_a} {A.shape} and {name_b} {B.shape} must have the same shape")
     if not len(A):
         raise DataError("no samples: a mean error needs at least one")
     return A, B
+
+
+def _check_squarable(names: str, *arrays: np.ndarray) -> None:
+    largest = max(float(np.abs(A).max(initial=0.0)) for A in arrays)
+    if largest and not 1 / SQUARABLE <= largest <= SQUARABLE:
+        raise DataError(
+            f"{names} reach {largest:.3g}, whose square double precision does not hold: give them in another unit"
+        )

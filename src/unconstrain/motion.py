@@ -1,60 +1,77 @@
-"""Which actions move, and in which direction."""
+"""Lengths and directions of actions, and which actions move at all."""
 
 import numpy as np
 
-# An action this much shorter than the longest one is rounding left by a projection that blocked all motion:
-# its direction is noise, and would be taught as truth.
 NO_MOTION = 1e-12
+"""Share of the longest action below which an action is at rest.
+
+So short an action is the rounding that a projection leaves where it blocks all motion: its direction is noise, and a
+policy would learn it as truth.
+"""
+
+SQUARABLE = 1e150
+"""Numbers between the inverse of this and this can be squared and summed in double precision."""
 
 
 def lengths(U: np.ndarray) -> np.ndarray:
-    """Lengths of actions, in double precision whatever theirs is.
+    """Compute the lengths of actions, in double precision whatever theirs is.
 
     Parameters
     ----------
-    U : array (N, d)
+    U : ndarray of shape (N, d)
+        Actions of any magnitude: no length overflows or underflows because a square would.
 
     Returns
     -------
-    array (N,)
-        `‖u‖`.
+    ndarray of shape (N,)
+        `‖u‖`, in the unit of the actions.
     """
-    squares = np.einsum("nd,nd->n", U, U, dtype=np.float64)
-    return np.sqrt(squares, out=squares)
+    # A square that overflows shows in the result, so that ordinary actions are looked at only once.
+    with np.errstate(over="ignore", under="ignore"):
+        squares = np.einsum("nd,nd->n", U, U, dtype=np.float64)
+    longest = squares.max(initial=0.0)
+    if SQUARABLE**-2 < longest < SQUARABLE**2:
+        return np.sqrt(squares, out=squares)
+    largest = np.abs(U).max(axis=1, initial=0.0).astype(np.float64)
+    shares = np.divide(U, largest[:, None], out=np.zeros(U.shape), where=largest[:, None] > 0)
+    return largest * np.sqrt(np.einsum("nd,nd->n", shares, shares))
 
 
 def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
-    """Which actions have a direction: those longer than `NO_MOTION` times `scale`.
+    """Tell which actions have a direction: those longer than `NO_MOTION` times `scale`.
 
     Parameters
     ----------
-    U : array (N, d)
+    U : ndarray of shape (N, d)
+        Actions.
     scale : float, optional
-        Length of the longest action, in the action's unit, where it is known from elsewhere. By default that of U.
+        Length of the longest action, in the unit of the actions, where it is known from elsewhere. By default the
+        longest of `U`.
 
     Returns
     -------
-    array (N,) of bool
+    ndarray of shape (N,), bool
+        True where the action moves.
     """
     r = lengths(U)
     return r > NO_MOTION * (r.max(initial=0.0) if scale is None else scale)
 
 
 def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions and lengths of actions.
+    """Split actions into directions and lengths.
 
     Parameters
     ----------
-    U : array (N, d)
+    U : ndarray of shape (N, d)
+        Actions.
 
     Returns
     -------
-    unit : array (N, d)
+    unit : ndarray of shape (N, d)
         `û`, zero where an action does not move.
-    r : array (N,)
+    r : ndarray of shape (N,)
         `‖u‖`, zero where an action does not move.
     """
     r = lengths(U)
     r[r <= NO_MOTION * r.max(initial=0.0)] = 0.0
-    inverse = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0)
-    return U * inverse[:, None], r
+    return np.divide(U, r[:, None], out=np.zeros(U.shape), where=r[:, None] > 0), r

@@ -10,7 +10,7 @@ The folds are the same for all candidates. What features take from the states al
 take from all of them, as one fit does; nothing of a held-out action enters. No true policy is asked for: that the
 least inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that
 no episode ever moved in are not judged. Where projections of some samples are known, their error is that under the
-constraint (`risk.auto`), which judges more of the policy.
+constraint (`metrics.inconsistency` with projections), which judges more of the policy.
 """
 
 import time
@@ -22,6 +22,7 @@ import numpy as np
 from sklearn.base import clone
 from sklearn.preprocessing import SplineTransformer
 
+from unconstrain import metrics
 from unconstrain.arrays import check_actions, check_groups, check_number, check_projections, check_samples
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
@@ -45,7 +46,7 @@ class Row:
     """One candidate's line of the comparison.
 
     inconsistency: pooled over held-out samples, in squared units of the action; NaN where the candidate failed. With
-        projections given it is `risk.auto`.
+        projections given it is `metrics.inconsistency` with projections.
     standard_error: of that, over folds. Candidates share the folds, so differences are surer than it says.
     explained: share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
     alpha: λ, as chosen on all the data. n_parameters: of all actions together. seconds: to fit and to hold out.
@@ -153,7 +154,7 @@ def select_policy(
     X (N, n), U (N, d): states and actions. groups (N,): episodes, which are held out whole; without them contiguous
         blocks are.
     projections: N (N, d, d), what is known of the constraints, all NaN where it is not; candidates are then judged by
-        `risk.auto`, and those whose risk is "auto" or "constrained" learn from it.
+        `metrics.inconsistency` with projections, and those whose risk is "auto" or "constrained" learn from it.
     n_jobs: candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
     progress: called with each candidate's `Row` once it is done, in the order given.
 
@@ -174,7 +175,7 @@ def select_policy(
         projections = check_projections(projections, *actions.shape, unknown=True)
     # What no candidate could be judged on is told here, as the mistake it is, and not as each one's failure.
     next(selection.splits(len(X), groups))
-    selection.explained(actions, np.zeros_like(actions))
+    metrics.explained(actions, np.zeros_like(actions))
 
     parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
     rows, policies = [], {}

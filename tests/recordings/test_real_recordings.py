@@ -12,7 +12,7 @@ import pytest
 
 import unconstrain as uc
 from unconstrain.cli import main
-from unconstrain.fitting.solve import explained
+from unconstrain.metrics import explained
 from unconstrain.simulation import rollout
 
 ROOT = Path(__file__).parents[2]

@@ -11,12 +11,11 @@ import typer
 from rich.table import Table
 
 from reproduction import toy
-from unconstrain import atomic
+from unconstrain import atomic, metrics
 from unconstrain.cli import reporting
 from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
-from unconstrain.fitting import solve as selection
 from unconstrain.plot import policy as figures
 
 ROWS = {
@@ -43,7 +42,7 @@ def demo(
         for kind, name in ROWS.items():
             policy = toy.learn(training, kind)
             errors = toy.errors(policy, test)
-            share = selection.explained(test.actions, policy.predict(test.states))
+            share = metrics.explained(test.actions, policy.predict(test.states))
             rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}", f"{share:.2%}"))
         picture = figures.save(toy.figure_3(), out / "limit-cycle.png")
         _write_csv(training, out / "movements.csv")

@@ -10,7 +10,6 @@ from rich.table import Table
 from unconstrain import metrics as risk
 from unconstrain.cli import recordings, reporting
 from unconstrain.errors import DataError
-from unconstrain.fitting import solve as selection
 from unconstrain.policies import load_policy
 
 
@@ -60,5 +59,5 @@ def evaluate(
 
 
 def _add(table: Table, label: str, U: np.ndarray, P: np.ndarray) -> None:
-    share = f"{selection.explained(U, P):.2%}" if np.any(U) else "nothing moves"
+    share = f"{risk.explained(U, P):.2%}" if np.any(U) else "nothing moves"
     table.add_row(label, str(len(U)), f"{risk.inconsistency(U, P):.4g}", share)

@@ -1,10 +1,9 @@
-"""Dealing episodes out to folds, choosing the weight decay λ from moments by fold, and what a policy explains."""
+"""Dealing episodes out to folds, and choosing the weight decay λ from moments by fold."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from unconstrain import metrics as risk
 from unconstrain.errors import DataError
 from unconstrain.fitting.moments import Moments
 
@@ -96,15 +95,3 @@ def splits(n_samples: int, groups=None) -> Iterator[tuple[np.ndarray, np.ndarray
         )
     for k in present:
         yield np.flatnonzero(fold != k), np.flatnonzero(fold == k)
-
-
-def explained(U, P) -> float:
-    """Share of observed motion explained, `1 - Σ (r - û·p)² / Σ r²`, of actions U (N, d) by predictions P (N, d).
-
-    1 for a policy consistent with every sample, 0 for one that says "do not move", negative for worse than that.
-    Raises `DataError` where nothing moves.
-    """
-    motion = float(np.mean(np.sum(np.square(U), axis=-1)))
-    if motion == 0.0:
-        raise DataError("all actions are zero: there is no motion to explain")
-    return 1.0 - risk.inconsistency(U, P) / motion

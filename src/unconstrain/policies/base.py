@@ -9,6 +9,7 @@ import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
+from unconstrain import metrics
 from unconstrain.arrays import (
     check_actions,
     check_choice,
@@ -121,7 +122,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         if sample_weight is not None:
             root = np.sqrt(check_weights(sample_weight, U))[:, None]
             U, P = U * root, P * root
-        return selection.explained(U, P)
+        return metrics.explained(U, P)
 
     def save(self, path: str | Path) -> None:
         """Write the policy to `path` (customarily `.skops`), to be read by `load_policy`. Holds no pickle."""

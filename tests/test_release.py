@@ -1,0 +1,20 @@
+"""The version and the day of its release are said in several files, and are the same in all of them."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import unconstrain
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_version_and_its_date_agree_everywhere():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert unconstrain.__version__ == version
+    citation = (ROOT / "CITATION.cff").read_text()
+    (cited,) = re.findall(r"^version: (.+)$", citation, re.MULTILINE)
+    (released,) = re.findall(r'^date-released: "(.+)"$', citation, re.MULTILINE)
+    newest = re.search(r"^## (\S+) \((.+)\)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert newest is not None
+    assert (cited, newest[1], newest[2]) == (version, version, released)

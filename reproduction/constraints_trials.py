@@ -134,6 +134,8 @@ def _errors(estimator: Any, D: Demonstrations, noise: float = 0.0, rng: Any = No
         learnt = clone(estimator).fit(train.states, U, groups=train.episodes)
     except UnconstrainError:  # noise hides the number of rows
         return {"nPPE": np.nan, "nPOE": np.nan, "rows": 0}
+    assert test.policy is not None
+    assert test.projections is not None
     N = learnt.predict(test.states)
     ppe = risk.projected_policy_error(test.policy, test.projections, N)
     poe = risk.projected_observation_error(test.actions, N)

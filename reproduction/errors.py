@@ -8,6 +8,7 @@ from unconstrain.demonstrations import Demonstrations
 
 def nupe(held_out: Demonstrations, P: ArrayLike) -> float:
     """nUPE, `mean ‖π - p‖² / Σ_j var(π_j)`, of predictions P (N, d)."""
+    assert held_out.policy is not None
     return risk.normalized(risk.unconstrained_policy_error(held_out.policy, P), held_out.policy)
 
 
@@ -17,6 +18,8 @@ def ncpe(held_out: Demonstrations, P: ArrayLike, projections: ArrayLike | None =
     projections: N (N, d, d); by default those the demonstrations were made under.
     """
     N = held_out.projections if projections is None else projections
+    assert held_out.policy is not None
+    assert N is not None
     return risk.normalized(risk.constrained_policy_error(held_out.policy, P, N), held_out.policy)
 
 

@@ -275,8 +275,8 @@ def explained(U: ArrayLike, P: ArrayLike) -> float:
         raise DataError(
             "predictions are so much larger than the actions that their squares cannot be compared"
         )
-    U, P = U / largest, P / largest
-    return 1.0 - inconsistency(U, P) / float(np.mean(_squares(U)))
+    scaled = U / largest
+    return 1.0 - inconsistency(scaled, P / largest) / float(np.mean(_squares(scaled)))
 
 
 def _squares(E: np.ndarray) -> np.ndarray:

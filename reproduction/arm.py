@@ -14,7 +14,7 @@ from reproduction.trials import run_trials
 from unconstrain import atomic
 from unconstrain.errors import UnconstrainError
 from unconstrain.plot import policy as figures
-from unconstrain.robots.task import TaskConstraint
+from unconstrain.robots import TaskConstraint
 
 TRIALS = 100
 MODELS = ("published", "auto")
@@ -114,7 +114,7 @@ def reproduce(
 
 def _checked(constraint: str) -> str:
     """The constraint's text, once it and its complement are known to make sense."""
-    understood = TaskConstraint.of(constraint)
+    understood = TaskConstraint.parse(constraint)
     understood.complement()
     return understood.name
 

@@ -19,7 +19,7 @@ from reproduction.plants.rendering import Camera, NoOpenGL
 from reproduction.trials import run_trials
 from unconstrain import atomic
 from unconstrain.plot import policy as figures
-from unconstrain.robots.robot import simulator
+from unconstrain.robots import import_mujoco
 from unconstrain.selection import select_policy
 
 TRIALS = 50
@@ -95,7 +95,7 @@ def _trial(scenario: str, seed: int, episodes: int) -> dict[str, Any]:
 
 def reproduce(out: Path, *, trials: int | None, jobs: int, console: Console) -> Outcome:
     """Both scenarios over 50 data sets, or as many as asked for. Raises `UnconstrainError` without the extra `sim`."""
-    simulator()
+    import_mujoco()
     results = run_trials(
         partial(trial, SCENARIOS),
         TRIALS if trials is None else trials,

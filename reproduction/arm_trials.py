@@ -19,7 +19,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
-from unconstrain.robots.task import TaskConstraint
+from unconstrain.robots import TaskConstraint
 from unconstrain.selection import select_policy
 
 POWERS = (1.5, 1.8, 2.0)
@@ -61,7 +61,7 @@ class Recordings:
     @classmethod
     def simulate(cls, p: float, constraint: str, seed: int, episodes: int = EPISODES) -> "Recordings":
         """The data set of this number; starts and split are the same for all policies and constraints."""
-        blocked, policy = TaskConstraint.of(constraint), arm.PowerPolicy(p)
+        blocked, policy = TaskConstraint.parse(constraint), arm.PowerPolicy(p)
         new, other = (max(1, episodes * n // EPISODES) for n in (NEW_EPISODES, COMPLEMENTARY_EPISODES))
         everything = arm.demonstrate(blocked, policy, episodes + new, LENGTH, random_state=seed)
         complementary = arm.demonstrate(blocked.complement(), policy, other, LENGTH, random_state=seed)

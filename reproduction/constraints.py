@@ -31,7 +31,7 @@ from reproduction.outcome import Outcome, write_results
 from reproduction.trials import run_trials
 from unconstrain.errors import UnconstrainError
 from unconstrain.plot import policy as figures
-from unconstrain.robots.robot import simulator
+from unconstrain.robots import import_mujoco
 
 TRIALS = 50
 RECORDINGS = Path("../shared/data")
@@ -82,7 +82,7 @@ def reproduce(
         ),
     }
     try:
-        simulator()
+        import_mujoco()
     except UnconstrainError as error:
         findings.append(f"Measured constraints are left out: {error}.")
     else:

@@ -14,7 +14,7 @@ from reproduction.plants.grasping import FREQUENCY, Demonstrator, constrain
 from reproduction.plants.scene import show
 from reproduction.plants.whole_body import WholeBody
 from unconstrain.errors import UnconstrainError
-from unconstrain.robots.robot import simulator
+from unconstrain.robots import import_mujoco
 
 STEP = 0.02
 """By which a key widens, narrows or moves the gap, in metres."""
@@ -93,7 +93,7 @@ def view(demonstrator: Demonstrator, policy: Any) -> None:
     Raises `UnconstrainError` where there is no display, or MuJoCo's viewer cannot run here.
     """
     check_display()
-    mujoco = simulator()
+    mujoco = import_mujoco()
     interaction = Interaction(demonstrator, policy)
     shown = mujoco.MjData(interaction.model)
     try:

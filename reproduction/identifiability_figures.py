@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from reproduction import identifiability_trials as trying
-from reproduction import toy as toy_experiment
 from reproduction.identifiability_surfaces import Surface
+from unconstrain import demo
 from unconstrain import limit_cycle as plant
 from unconstrain.diagnostics import identifiability
 from unconstrain.plot import policy as figures
@@ -25,7 +25,7 @@ COLORS = ("#0072B2", "#009E73", "#E69F00", "#D55E00")
 def toy(seed: int = 0, movements: int = 4) -> Figure:
     """Predicted deviation and actual error over the plane, after few movements."""
     demos = plant.demonstrate(movements, random_state=np.random.default_rng([seed, 0]))
-    policy = toy_experiment.model().fit(demos.states, demos.actions, groups=demos.episodes)
+    policy = demo.make_policy().fit(demos.states, demos.actions, groups=demos.episodes)
     report = identifiability(policy, demos.states, demos.actions, groups=demos.episodes)
     figure = Figure(figsize=(10.5, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from reproduction import arm_trials
-from reproduction import toy as toy_experiment
 from reproduction.errors import nupe
 from reproduction.plants import arm
+from unconstrain import demo
 from unconstrain import limit_cycle as toy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics import identifiability
@@ -17,7 +17,7 @@ from unconstrain.features import DecoupledFeatures
 from unconstrain.motion import directions
 from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 from unconstrain.policies.base import Policy
-from unconstrain.robots.task import TaskConstraint
+from unconstrain.robots import TaskConstraint
 
 POWERS = (1.5, 1.8)
 BEST_FIRST = ("2-4-6", "1-3-5", "4-5-6", "1-2-3")
@@ -82,7 +82,7 @@ def _calibration(seed: int) -> dict[str, dict[str, float]]:
     result = {}
     test = toy.demonstrate(random_state=np.random.default_rng([seed, 1]))
     models: dict[str, Callable[[], Policy]] = {
-        "RBF": toy_experiment.model,
+        "RBF": demo.make_policy,
         "locally linear": lambda: LocallyLinearPolicy(alpha="cv"),
         "linear (misspecified)": lambda: ParametricPolicy(alpha="cv"),
     }
@@ -92,7 +92,7 @@ def _calibration(seed: int) -> dict[str, dict[str, float]]:
             policy = model().fit(seen.states, seen.actions, groups=seen.episodes)
             result[f"toy, {name}, noise {noise:.0%}"] = told(policy, test)
     few = toy.demonstrate(4, random_state=np.random.default_rng([seed, 0]))
-    policy = toy_experiment.model().fit(few.states, few.actions, groups=few.episodes)
+    policy = demo.make_policy().fit(few.states, few.actions, groups=few.episodes)
     result["toy, RBF, 4 movements"] = told(policy, test)
 
     # The model holds the truth and the noise is what it assumes: what remains is the arithmetic.
@@ -128,7 +128,7 @@ def _toy_advised(seed: int, way: str) -> list[float]:
     errors = []
     while True:
         seen = Demonstrations.concatenate(movements)
-        policy = toy_experiment.model().fit(seen.states, seen.actions, groups=seen.episodes)
+        policy = demo.make_policy().fit(seen.states, seen.actions, groups=seen.episodes)
         errors.append(nupe(test, policy.predict(test.states)))
         if len(movements) == TOY_MOST:
             return errors
@@ -160,7 +160,7 @@ def _arm_advised(seed: int, way: str) -> list[float]:
     """nUPE after every `ARM_AT_ONCE` demonstrations, each from a start in a pool under one of four constraints."""
     rng = np.random.default_rng([seed, 4])
     truth = arm.PowerPolicy(1.8)
-    constraints = [TaskConstraint.of(rows) for rows in BEST_FIRST]
+    constraints = [TaskConstraint.parse(rows) for rows in BEST_FIRST]
     tests = [
         arm.demonstrate(one, truth, 8, random_state=np.random.default_rng([seed, 5])) for one in constraints
     ]

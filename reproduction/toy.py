@@ -1,7 +1,6 @@
 """The toy limit cycle (section 4.1): Figs. 3 and 4 over 100 data sets."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,19 +8,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from reproduction import published
-from reproduction.errors import both
 from reproduction.outcome import Outcome, write_results
 from reproduction.trials import run_trials
-from unconstrain import limit_cycle as toy
-from unconstrain.demonstrations import Demonstrations
-from unconstrain.features import NormalizedRBF
+from unconstrain import demo
+from unconstrain.demo import FEW, MOVEMENTS, WIDTH, draw_data, learn, measure_errors
 from unconstrain.plot import policy as figures
-from unconstrain.policies import ParametricPolicy
 
 TRIALS = 100
-MOVEMENTS, FEW = 40, 4
-WIDTH = 0.8
-"""σ of the RBFs, twice the spacing of their 6 x 6 grid over [-1, 1]²: one for everything in this experiment."""
 SHARES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 """Of the 40 movements, in Fig. 4 (top). 5 % are two movements, the fewest that can be cross-validated."""
 NOISE = (0.0, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2)
@@ -37,47 +30,19 @@ CHOICES = (
 )
 
 
-def model(kind: str = "inconsistency") -> ParametricPolicy:
-    """The model of this experiment: 36 normalised RBFs, λ by cross-validation of the risk `kind`."""
-    axis = np.linspace(-1.0, 1.0, 6)
-    centers = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    return ParametricPolicy(NormalizedRBF(centers=centers, width=WIDTH), risk=kind, alpha="cv")
-
-
-def data(seed: int, noise: float = 0.0) -> tuple[Demonstrations, Demonstrations]:
-    """Data set number `seed`: 40 movements to learn from, and 40 others, without noise, to test on."""
-    training = toy.demonstrate(MOVEMENTS, noise=noise, random_state=np.random.default_rng([seed, 0]))
-    return training, toy.demonstrate(MOVEMENTS, random_state=np.random.default_rng([seed, 1]))
-
-
-def errors(policy: ParametricPolicy, held_out: Demonstrations) -> dict[str, float]:
-    """nUPE and nCPE on held-out movements."""
-    return both(held_out, policy.predict(held_out.states))
-
-
-def learn(
-    demonstrations: Demonstrations, kind: str = "inconsistency", movements: int = MOVEMENTS
-) -> ParametricPolicy:
-    """The policy learnt from the first `movements`; `kind` "oracle" is regression on the true policy."""
-    seen = demonstrations.select(demonstrations.episodes < movements)
-    if kind == "oracle":
-        return model("direct").fit(seen.states, seen.policy, groups=seen.episodes)
-    return model(kind).fit(seen.states, seen.actions, groups=seen.episodes)
-
-
 def trial(seed: int) -> dict[str, dict[str, float]]:
     """Errors of one data set: the table's rows, and both sweeps."""
-    training, test = data(seed)
+    training, test = draw_data(seed)
     result = {
-        f"{kind}, {movements} trajectories": errors(learn(training, kind, movements), test)
+        f"{kind}, {movements} trajectories": measure_errors(learn(training, kind, movements), test)
         for kind in ("inconsistency", "direct", "oracle")
         for movements in (FEW, MOVEMENTS)
     }
     for share in SHARES:
-        result[f"share {share}"] = errors(learn(training, movements=round(share * MOVEMENTS)), test)
+        result[f"share {share}"] = measure_errors(learn(training, movements=round(share * MOVEMENTS)), test)
     for noise in NOISE:
-        noisy, test = data(seed, noise)
-        result[f"noise {noise}"] = errors(learn(noisy), test)
+        noisy, test = draw_data(seed, noise)
+        result[f"noise {noise}"] = measure_errors(learn(noisy), test)
     return result
 
 
@@ -153,53 +118,13 @@ def _findings(results: list[dict]) -> tuple[str, ...]:
     )
 
 
-def figure_3(results: list[dict] | None = None) -> Figure:
-    """The true field, the field learnt from 4 and from 40 trajectories, and the direct one, of data set 0."""
-    training, test = data(0)
-    few = training.select(training.episodes < FEW)
-    panels: list[tuple[str, Any, Demonstrations | None, str, str | None]] = [
-        ("true policy", toy.LimitCycle(), None, "", figures.TRUE),
-        (
-            f"learnt, {FEW} movements",
-            learn(training, movements=FEW),
-            few,
-            f"inconsistency, {FEW} trajectories",
-            None,
-        ),
-        (
-            f"learnt, {MOVEMENTS} movements",
-            learn(training),
-            training,
-            f"inconsistency, {MOVEMENTS} trajectories",
-            None,
-        ),
-        (
-            "ordinary regression",
-            learn(training, "direct"),
-            training,
-            f"direct, {MOVEMENTS} trajectories",
-            figures.DIRECT,
-        ),
-    ]
-    figure = Figure(figsize=(14.0, 4.3), layout="constrained")
-    # The length of the arrows halfway between the cycle and the corners: those at the corners may overlap.
-    longest = float(np.linalg.norm(toy.LimitCycle()(np.array([[0.8, 0.8]])), axis=1)[0])
-    free = toy.demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))
-    for ax, (title, policy, shown, row, color) in zip(figure.subplots(1, 4), panels, strict=True):
-        shown = free if shown is None else shown
-        figures.trajectories(ax, shown.states, shown.episodes)
-        figures.field(ax, policy, color=color or figures.LEARNT, longest=longest)
-        caption = ""
-        if row:
-            values = {error: _collected(results, row, error) for error in ("nUPE", "nCPE")} if results else {}
-            caption = "\n".join(
-                f"{error} {v.mean():.2g} ± {v.std():.2g}" for error, v in values.items()
-            ) or "   ".join(f"{error} {value:.2g}" for error, value in errors(policy, test).items())
-        ax.set_title(title, fontsize=12)
-        ax.set_aspect("equal", adjustable="box")
-        ax.set(xlim=(-1.2, 1.2), ylim=(-1.2, 1.2), xticks=(-1, 0, 1), yticks=(-1, 0, 1))
-        ax.set_xlabel(f"x1\n{caption}" if caption else "x1")
-    return figure
+def figure_3(results: list[dict]) -> Figure:
+    """The true field, those learnt from 4 and from 40 movements, and the direct one; errors of all data sets."""
+    captions = {}
+    for row in results[0]:
+        errors = {error: _collected(results, row, error) for error in ("nUPE", "nCPE")}
+        captions[row] = "\n".join(f"{error} {v.mean():.2g} ± {v.std():.2g}" for error, v in errors.items())
+    return demo.plot_fields(captions)
 
 
 def figure_4(results: list[dict]) -> Figure:

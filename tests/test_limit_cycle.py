@@ -25,7 +25,8 @@ def test_the_field_is_the_polar_one():
 
 
 def test_movement_ends_on_the_cycle():
-    end = rollout(LimitCycle(), [[0.05, 0.0], [1.0, -1.0]], steps=2000, dt=0.01).states[:, -1]
+    movements = rollout(LimitCycle(), [[0.05, 0.0], [1.0, -1.0]], steps=2000, dt=0.01)
+    end = movements.states.reshape(2, 2001, 2)[:, -1]
     np.testing.assert_allclose(np.linalg.norm(end, axis=1), np.sqrt(0.5), rtol=0.01)
 
 

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.robots.robot import Robot
-from unconstrain.robots.task import TaskConstraint
+from unconstrain.robots import Robot, TaskConstraint
 
 Array = NDArray[np.float64]
 
@@ -127,7 +126,7 @@ def demonstrate(
             f"demonstrations need at least one episode and sample and a positive step, not {n_episodes}, "
             f"{length} and {step}"
         )
-    constraint, policy = TaskConstraint.of(constraint), policy or PowerPolicy()
+    constraint, policy = TaskConstraint.parse(constraint), policy or PowerPolicy()
     x = starts(n_episodes, random_state)
     states, wanted, actions = np.empty((3, n_episodes, length, JOINTS))
     projections = np.empty((n_episodes, length, JOINTS, JOINTS))

@@ -21,7 +21,7 @@ from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.recordings.differentiate import differentiate
-from unconstrain.robots.robot import Robot, simulator
+from unconstrain.robots import Robot, import_mujoco
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def stage(scenario: str) -> Robot:
 
     Raises `UnconstrainError` for an unknown scenario, or where the extra `sim` is not installed.
     """
-    mujoco = simulator()
+    mujoco = import_mujoco()
     if scenario not in SCENARIOS:
         raise UnconstrainError(f"there is no scenario {scenario!r}: choose one of {', '.join(SCENARIOS)}")
     spec = arm.robot().spec.copy()
@@ -210,7 +210,7 @@ def _simulate(
     robot: Robot, policy: arm.PowerPolicy, q: Array, mocap: Array, samples: int, every: int
 ) -> tuple[Array, Array]:
     """Joint angles (S, samples, 7) and touch (S, samples) in newtons, a sample each `every` steps."""
-    batch = simulator().batch.Batch(robot.model, len(q), 1)
+    batch = import_mujoco().batch.Batch(robot.model, len(q), 1)
     batch.qpos, batch.mocap_pos, batch.mocap_quat = q, mocap[:, None, :3], mocap[:, None, 3:]
     qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
     touch = batch.bind("sensordata") if robot.model.nsensor else None
@@ -228,7 +228,7 @@ def _simulate(
 
 
 def _add_grip(spec: Any) -> None:
-    mujoco = simulator()
+    mujoco = import_mujoco()
     grip = spec.worldbody.add_body(name="grip", mocap=True)
     grip.add_site(name="held", size=[0.03] * 3, rgba=[0.0, 0.45, 0.7, 0.6])
     hold = spec.add_equality(name="hold", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE)
@@ -238,7 +238,7 @@ def _add_grip(spec: Any) -> None:
 
 
 def _add_table(spec: Any) -> None:
-    mujoco = simulator()
+    mujoco = import_mujoco()
     spec.body("base").quat = [0.0, 1.0, 0.0, 0.0]  # hangs from the ceiling
     table = spec.worldbody.add_body(name="table", mocap=True)
     top = table.add_geom(name="top", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.75, 0.75, 0.01])

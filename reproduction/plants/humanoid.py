@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.robots.robot import Robot, RobotError, simulator
+from unconstrain.robots import Robot, RobotError, import_mujoco
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Humanoid:
         `Robot.pose` and `Robot.jacobian` give the same one frame at a time; here one pass over the robot serves
         all of it, which matters to the million postures of an experiment.
         """
-        mujoco, model, data = simulator(), self.robot.model, self._data
+        mujoco, model, data = import_mujoco(), self.robot.model, self._data
         X, J = np.empty((len(Q), 2, 3)), np.empty((len(Q), 2, 3, self.n))
         for q, x, jacobian in zip(Q, X, J, strict=True):
             data.qpos = q
@@ -110,7 +110,7 @@ class Humanoid:
         """Height of the floor in metres: the robot's lowest point at home."""
         model, data = self.robot.model, self._data
         data.qpos = self.home
-        simulator().mj_kinematics(model, data)
+        import_mujoco().mj_kinematics(model, data)
         centre, half = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
         turn = data.geom_xmat.reshape(-1, 3, 3)[:, 2]
         lowest = data.geom_xpos[:, 2] + np.sum(turn * centre, axis=1) - np.sum(np.abs(turn) * half, axis=1)
@@ -160,7 +160,7 @@ class Humanoid:
 
     @cached_property
     def _data(self):
-        return simulator().MjData(self.robot.model)
+        return import_mujoco().MjData(self.robot.model)
 
     @cached_property
     def _hand_frames(self) -> list[tuple[Array, int, int]]:
@@ -176,7 +176,7 @@ class Humanoid:
         ]
 
     def _contacts(self, q: Array) -> set[tuple[int, int]]:
-        mujoco, model, data = simulator(), self.robot.model, self._data
+        mujoco, model, data = import_mujoco(), self.robot.model, self._data
         data.qpos[:] = q
         mujoco.mj_kinematics(model, data)
         mujoco.mj_collision(model, data)

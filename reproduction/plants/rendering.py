@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import UnconstrainError
-from unconstrain.robots.robot import simulator
+from unconstrain.robots import import_mujoco
 
 Image = NDArray[np.uint8]
 
@@ -48,7 +48,7 @@ class Camera:
         azimuth: float,
         elevation: float,
     ):
-        mujoco = simulator()
+        mujoco = import_mujoco()
         self.model, self._data = model, mujoco.MjData(model)
         model.vis.global_.offwidth = max(width, model.vis.global_.offwidth)
         model.vis.global_.offheight = max(height, model.vis.global_.offheight)
@@ -67,7 +67,7 @@ class Camera:
     def picture(self, posture: NDArray[np.float64]) -> Image:
         """The model in a posture (nq,), as an image (height, width, 3)."""
         self._data.qpos = posture
-        simulator().mj_forward(self.model, self._data)
+        import_mujoco().mj_forward(self.model, self._data)
         self._renderer.update_scene(self._data, self._camera)
         return self._renderer.render()
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from reproduction.plants import barrier
 from reproduction.plants.barrier import CLEARANCE, Barrier
-from unconstrain.robots.robot import simulator
+from unconstrain.robots import import_mujoco
 
 Array = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ class Scene:
 
     def furnish(self, spec: Any) -> None:
         """Add floor, table, ball, barrier and light to a robot's `mujoco.MjSpec`, to be looked at only."""
-        mujoco = simulator()
+        mujoco = import_mujoco()
         kind, world = mujoco.mjtGeom, spec.worldbody
         see_only = {"contype": 0, "conaffinity": 0}
         sky = spec.add_texture(

@@ -20,3 +20,7 @@ class PolicyError(UnconstrainError):
 
 class PolicyFileError(PolicyError):
     """A policy file that is not one of ours, is damaged, or was written by a newer release."""
+
+
+class RobotError(UnconstrainError):
+    """A robot file that cannot be used, or a joint or frame that is not in it."""

@@ -1,13 +1,14 @@
 """The paper's limit cycle under random constraints (section 4.1): the smallest plant that shows the problem."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.constraints import projection, unconstrained
+from unconstrain.constraints.nullspace import projection, unconstrained
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.simulation import check_memory, simulate
 
 SEGMENTS = 3
 """Constraints per trajectory: the first, and two redraws at regular intervals."""
@@ -56,7 +57,7 @@ def demonstrate(
     """Movements of the limit cycle, each under three random constraints, one after the other.
 
     Starts are uniform in [-1, 1]². The constraint ``A = (α1, α2)``, ``α ~ N(0, 1)``, is drawn anew in each
-    third of a trajectory; the action is ``u = N π(x)`` and ``x ← x + u / rate``.
+    third of a trajectory; the action is ``u = N π(x)`` and the state moves by ``u / rate``.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def demonstrate(
     Raises
     ------
     UnconstrainError
-        If a number is not positive, or the noise negative.
+        If a number is not positive, the noise is negative, or the samples do not fit into memory.
     """
     if n_episodes < 1 or length < 1 or not (np.isfinite(rate) and rate > 0):
         raise UnconstrainError(
@@ -92,6 +93,7 @@ def demonstrate(
         )
     if not (np.isfinite(noise) and noise >= 0):
         raise UnconstrainError(f"the noise is a share of the actions' scale, 0 or more, not {noise}")
+    check_memory(n_episodes, length, 2, 2, constrained=True)
     rng = np.random.default_rng(random_state)
     policy = policy or LimitCycle()
 
@@ -102,24 +104,16 @@ def demonstrate(
         N = np.broadcast_to(unconstrained(2), N.shape)
 
     segment = np.arange(length) * SEGMENTS // length
-    states, wanted = np.empty((2, n_episodes, length, 2))
-    actions = np.empty((n_episodes, length, 2))
-    for k in range(length):
-        states[:, k] = x
-        wanted[:, k] = policy(x)
-        actions[:, k] = np.einsum("eij,ej->ei", N[:, segment[k]], wanted[:, k])
-        x = x + actions[:, k] / rate
-
-    recorded = actions.reshape(-1, 2)
-    if noise:
-        recorded = recorded + noise * recorded.std(axis=0) * rng.standard_normal(recorded.shape)
-    return Demonstrations(
-        states=states.reshape(-1, 2),
-        actions=recorded,
-        episodes=np.repeat(np.arange(n_episodes), length),
-        time=np.tile(np.arange(length) / rate, n_episodes),
-        policy=wanted.reshape(-1, 2),
-        projections=N[:, segment].reshape(-1, 2, 2),
+    clean = simulate(
+        policy,
+        x,
+        steps=length - 1,
+        dt=1 / rate,
+        project=lambda k, X, wanted: N[:, segment[k]],
         state_names=("x1", "x2"),
         action_names=("u1", "u2"),
     )
+    if not noise:
+        return clean
+    scale = noise * clean.actions.std(axis=0)
+    return replace(clean, actions=clean.actions + scale * rng.standard_normal(clean.actions.shape))

@@ -1,47 +1,55 @@
-"""Follow a policy through time, freely or under a constraint."""
+"""Follow a policy through time: the one integrator there is.
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+`rollout` is for users: a policy, a start, perhaps a constraint. `simulate` is the loop beneath it, open at two
+places for plants that are more than that: what projects the policy's action, and how the plant moves on.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.constraints import projection
+from unconstrain.constraints.nullspace import projection
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 
 Array = NDArray[np.float64]
+
+
+class Predictor(Protocol):
+    """What has a `predict` method: a fitted policy of this library, or any regressor."""
+
+    def predict(self, X: Any, /) -> Any:
+        """Actions (S, d) at states X (S, n)."""
+
+
+Policy = Predictor | Callable[[Array], ArrayLike]
+"""A fitted policy, or a function from states (S, n) to actions (S, d)."""
+
 Constraint = ArrayLike | Callable[[Array], ArrayLike]
+"""Rows A (k, d), or a function from states (S, n) to rows (S, k, d) or (k, d)."""
 
+Project = Callable[[int, Array, Array], Array]
+"""From the number of the sample, states (S, n) and the policy's actions (S, d) to projections N (S, d, d)."""
 
-@dataclass(frozen=True)
-class Rollout:
-    """Where a policy led, from one start or from S at once.
+Advance = Callable[[Array, Array], tuple[Array, Array]]
+"""From states (S, n) and actions (S, d) to the next states (S, n) and the actions that were carried out (S, d)."""
 
-    Attributes
-    ----------
-    states : array (steps + 1, n) or (S, steps + 1, n)
-        The start first, the state after the last step last.
-    actions : array (steps, n) or (S, steps, n)
-        What was done at each state but the last, ``N π(x)``, in state units per second.
-    time : array (steps + 1,)
-        Seconds since the start.
-    """
-
-    states: Array
-    actions: Array
-    time: Array
+StopWhen = Callable[[Array], ArrayLike]
+"""From states (S, n) to whether the movement ends there, one flag per state or one for all."""
 
 
 def rollout(
-    policy: Any,
+    policy: Policy,
     start: ArrayLike,
     steps: int,
     dt: float,
     constraint: Constraint | None = None,
     *,
-    stop_when: Callable[[Array], ArrayLike] | None = None,
-) -> Rollout:
+    stop_when: StopWhen | None = None,
+) -> Demonstrations:
     """Integrate a policy whose actions are velocities of its state: ``x_{k+1} = x_k + dt N(x_k) π(x_k)``.
 
     Parameters
@@ -59,8 +67,15 @@ def rollout(
         (S, n) and returns the rows at each, (S, k, n), or (k, n) where all share them. Without it the
         policy moves freely.
     stop_when : callable, optional
-        Is given the current states (S, n); where it says true for any of them the movement ends, with fewer steps.
-        `uncertainty.Unsure` ends it where the policy is not known.
+        Is given the current states (S, n). The movement ends at the first states for any of which it returns true.
+
+    Returns
+    -------
+    Demonstrations
+        ``steps + 1`` samples per start, fewer if `stop_when` ended the movement: the state, the action
+        ``N π(x)`` there, the policy's own action ``π(x)`` as `policy`, and the time in seconds. Every start is an
+        episode. Under a constraint, `projections` holds N. States have the names that the policy learnt, if it
+        knows them.
 
     Raises
     ------
@@ -69,44 +84,177 @@ def rollout(
     DataError
         If the start or the constraint is not finite or of the wrong shape.
     UnconstrainError
-        If `steps` or `dt` is not positive, or the state grows beyond all bounds (it says at which step).
+        If `steps` or `dt` is not positive, the samples do not fit into memory, or the state grows beyond all
+        bounds.
+
+    Examples
+    --------
+    >>> from unconstrain.limit_cycle import LimitCycle
+    >>> movement = rollout(LimitCycle(), [1.0, 0.0], steps=100, dt=0.02)
+    >>> movement.states.shape
+    (101, 2)
+    """
+    if _whole(steps) < 1:
+        raise UnconstrainError(f"a rollout needs a whole number of steps, at least 1, not {steps}")
+    if constraint is None:
+        return simulate(policy, start, steps, dt, stop_when=stop_when)
+    if callable(constraint):
+
+        def project(sample: int, X: Array, wanted: Array) -> Array:
+            return _one_per_start(projection(constraint(X)), *wanted.shape)
+
+    else:
+        fixed = projection(constraint)
+
+        def project(sample: int, X: Array, wanted: Array) -> Array:
+            return _one_per_start(fixed, *wanted.shape)
+
+    return simulate(policy, start, steps, dt, project=project, stop_when=stop_when)
+
+
+def simulate(
+    policy: Policy,
+    start: ArrayLike,
+    steps: int,
+    dt: float,
+    *,
+    project: Project | None = None,
+    advance: Advance | None = None,
+    stop_when: StopWhen | None = None,
+    state_names: Sequence[str] | None = None,
+    action_names: Sequence[str] | None = None,
+) -> Demonstrations:
+    """Let a policy move a plant, and record every sample.
+
+    At sample k the policy is asked for its actions ``π(x_k)``, `project` for the projections ``N``, and `advance`
+    is told to carry out ``N π(x_k)`` for the time `dt`.
+
+    Parameters
+    ----------
+    policy : object with ``predict(X)``, or callable ``X -> U``
+        Maps states (S, n) to actions (S, d).
+    start : array (n,) or (S, n)
+        One start, or several that are followed side by side.
+    steps : int
+        Number of steps between samples, at least 0.
+    dt : float
+        Time between samples, in seconds.
+    project : callable, optional
+        ``project(k, X, Pi) -> N``: projections (S, d, d) at states X (S, n) where the policy's actions are Pi (S, d).
+        Without it nothing constrains the plant.
+    advance : callable, optional
+        ``advance(X, U) -> (X, U)``: the states after the time `dt`, and the actions to record, which are those
+        carried out. It is called at every sample, the last included, since a plant may know what it did only
+        afterwards. By default ``X + dt U, U``, and actions have to be velocities of the state.
+    stop_when : callable, optional
+        As for `rollout`.
+    state_names, action_names : sequence of str, optional
+        By default the names that the policy learnt, or x1, x2, ...; actions are named after the states' velocities.
+
+    Returns
+    -------
+    Demonstrations
+        As for `rollout`.
+
+    Raises
+    ------
+    UnconstrainError
+        As for `rollout`.
     """
     predict = policy.predict if hasattr(policy, "predict") else policy
     if not callable(predict):
         raise PolicyError(
             f"a rollout needs a policy with a predict method, or a function of states, not {policy!r:.60}"
         )
-    if isinstance(steps, bool) or steps != int(steps) or steps < 1:
-        raise UnconstrainError(f"a rollout needs a whole number of steps, at least 1, not {steps}")
-    if not (np.isfinite(dt) and dt > 0):
-        raise UnconstrainError(f"the time step dt must be a positive number of seconds, not {dt}")
-    steps, single = int(steps), np.ndim(start) == 1
+    samples = _whole(steps) + 1
+    if samples < 1:
+        raise UnconstrainError(f"a rollout needs a whole number of steps, not {steps}")
+    _check_duration(dt)
     x = _checked_start(start, getattr(policy, "n_features_in_", None))
-
-    fixed = None if constraint is None or callable(constraint) else _projection(constraint, x.shape)
-    states = np.empty((len(x), steps + 1, x.shape[1]))
-    actions = np.empty((len(x), steps, x.shape[1]))
-    states[:, 0] = x
     # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(steps):
-            if stop_when is not None and np.any(stop_when(x)):
-                states, actions = states[:, : k + 1], actions[:, :k]
-                break
-            u = _actions(predict, x)
-            N = _projection(constraint(x), x.shape) if callable(constraint) else fixed
-            if N is not None:
-                u = (N @ u[..., None])[..., 0]
-            x = x + dt * u
-            if not np.isfinite(x).all():
+        for k in range(samples):
+            wanted = _actions(predict, x)
+            N = None if project is None else project(k, x, wanted)
+            u = wanted if N is None else np.einsum("sij,sj->si", N, wanted)
+            if k == 0:
+                (S, n), d = x.shape, wanted.shape[1]
+                check_memory(S, samples, n, d, constrained=N is not None)
+                states, policies, actions = (np.empty((S, samples, width)) for width in (n, d, d))
+                projections = None if N is None else np.empty((S, samples, d, d))
+            if advance is None:
+                _check_velocities(x, u)
+                following = x + dt * u
+            else:
+                following, u = advance(x, u)
+            if not (np.isfinite(u).all() and (k + 1 == samples or np.isfinite(following).all())):
+                step = min(k + 1, steps)
                 raise UnconstrainError(
-                    f"the rollout left all bounds at step {k + 1} of {steps} ({(k + 1) * dt:g} s): use a "
-                    "smaller time step dt, or start nearer to the data the policy was learnt from"
+                    f"the rollout left all bounds at step {step} of {steps} ({step * dt:g} s): use a smaller time step "
+                    "dt, or start nearer to the data the policy was learnt from"
                 )
-            actions[:, k] = u
-            states[:, k + 1] = x
-    time = np.linspace(0.0, actions.shape[1] * dt, actions.shape[1] + 1)
-    return Rollout(states[0], actions[0], time) if single else Rollout(states, actions, time)
+            states[:, k], policies[:, k], actions[:, k] = x, wanted, u
+            if projections is not None:
+                projections[:, k] = N
+            if k + 1 == samples or (stop_when is not None and np.any(stop_when(x))):
+                break
+            x = following
+
+    taken = k + 1
+    names = _names(policy, x.shape[1]) if state_names is None else tuple(state_names)
+    return Demonstrations(
+        states=_flat(states, taken),
+        actions=_flat(actions, taken),
+        episodes=np.repeat(np.arange(len(x)), taken),
+        time=np.tile(np.arange(taken) * dt, len(x)),
+        policy=_flat(policies, taken),
+        projections=None if projections is None else _flat(projections, taken),
+        state_names=names,
+        action_names=_action_names(names, actions.shape[-1]) if action_names is None else action_names,
+    )
+
+
+def check_memory(starts: int, samples: int, n: int, d: int, *, constrained: bool) -> None:
+    """Refuse movements that would not fit into memory, before anything is allocated.
+
+    Parameters
+    ----------
+    starts, samples : int
+        Number of movements, and of samples in each.
+    n, d : int
+        Dimensions of states and actions.
+    constrained : bool
+        Whether there is a projection (d, d) per sample.
+
+    Raises
+    ------
+    UnconstrainError
+        If the samples would take more than half of this computer's memory.
+    """
+    needed = 8 * starts * samples * (n + 2 * d + 2 + constrained * d * d)
+    available = _memory() // 2
+    if needed > available:
+        raise UnconstrainError(
+            f"{_count(samples, 'sample')} from {_count(starts, 'start')} would take {needed / 1e9:,.1f} GB, more than "
+            f"half of this computer's memory ({available / 1e9:,.1f} GB): take fewer steps or fewer starts at a time"
+        )
+
+
+def _whole(steps: Any) -> int:
+    """The number of steps as an int, -1 where it is none."""
+    try:
+        return -1 if isinstance(steps, bool) or steps != int(steps) else int(steps)
+    except (TypeError, ValueError, OverflowError):
+        return -1
+
+
+def _check_duration(dt: Any) -> None:
+    try:
+        usable = bool(np.isfinite(dt) and dt > 0)
+    except (TypeError, ValueError):
+        usable = False
+    if not usable:
+        raise UnconstrainError(f"the time step dt must be a positive number of seconds, not {dt}")
 
 
 def _checked_start(start: ArrayLike, expected: int | None) -> Array:
@@ -118,8 +266,8 @@ def _checked_start(start: ArrayLike, expected: int | None) -> Array:
         raise DataError(f"the start must be an array (n,), or (S, n) for several, not {np.shape(start)}")
     if expected is not None and x.shape[1] != expected:
         raise PolicyError(
-            f"the start has {_counted(x.shape[1], 'number')} but the policy was learnt over states of "
-            f"{_counted(expected, 'dimension')}: give {expected}"
+            f"the start has {_count(x.shape[1], 'number')} but the policy was learnt over states of "
+            f"{_count(expected, 'dimension')}: give {expected}"
         )
     if not np.isfinite(x).all():
         row, column = np.argwhere(~np.isfinite(x))[0]
@@ -129,34 +277,65 @@ def _checked_start(start: ArrayLike, expected: int | None) -> Array:
     return x
 
 
+def _memory() -> int:
+    """This computer's memory in bytes; 8 GB where the system does not say."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return 8 * 10**9
+
+
 def _actions(predict: Callable[[Array], ArrayLike], x: Array) -> Array:
     u = np.asarray(predict(x), dtype=np.float64)
+    if u.ndim == 1 and x.shape[1] == 1:
+        u = u[:, None]  # a policy that learnt actions (N,) predicts them so
     if u.ndim != 2 or len(u) != len(x):
         raise PolicyError(
             f"the policy must map states of shape {x.shape} to one row of actions each, not to {u.shape}"
         )
-    if u.shape[1] != x.shape[1]:
-        raise PolicyError(
-            f"the policy maps {_counted(x.shape[1], 'state')} to {_counted(u.shape[1], 'action')}, and only "
-            "velocities of the state, one each, can be rolled out: learn it from such actions"
-        )
     return u
 
 
-def _projection(rows: ArrayLike, shape: tuple[int, ...]) -> Array:
-    N = projection(rows)
-    if N.shape[-1] != shape[1]:
-        raise DataError(
-            f"the constraint's rows have {_counted(N.shape[-1], 'number')} but the policy has "
-            f"{_counted(shape[1], 'action')}: give one column per action"
+def _check_velocities(x: Array, u: Array) -> None:
+    if u.shape[1] != x.shape[1]:
+        raise PolicyError(
+            f"the policy maps {_count(x.shape[1], 'state')} to {_count(u.shape[1], 'action')}, and only "
+            "velocities of the state, one each, can be rolled out: learn it from such actions"
         )
-    if N.ndim == 3 and len(N) != shape[0]:
-        raise DataError(
-            f"the constraint gives rows for {_counted(len(N), 'state')} where there "
-            f"{'is' if shape[0] == 1 else 'are'} {shape[0]}: return shape (S, k, n), or (k, n) for all alike"
-        )
-    return N
 
 
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+def _one_per_start(N: Array, starts: int, d: int) -> Array:
+    """Projections (S, d, d) of as many or of one (d, d) that all starts share."""
+    if N.shape[-1] != d:
+        raise DataError(
+            f"the constraint's rows have {_count(N.shape[-1], 'number')} but the policy has "
+            f"{_count(d, 'action')}: give one column per action"
+        )
+    if N.ndim == 3 and len(N) != starts:
+        raise DataError(
+            f"the constraint gives rows for {_count(len(N), 'state')} where there "
+            f"{'is' if starts == 1 else 'are'} {starts}: return shape (S, k, n), or (k, n) for all alike"
+        )
+    return np.broadcast_to(N, (starts, d, d))
+
+
+def _names(policy: Policy, n: int) -> tuple[str, ...]:
+    """Names of the states where the policy learnt distinct ones, else x1, x2, ..."""
+    for attribute in ("state_names_", "feature_names_in_"):
+        names = tuple(getattr(policy, attribute, ()))
+        if len(names) == n and len(set(names)) == n and all(isinstance(name, str) for name in names):
+            return names
+    return tuple(f"x{i + 1}" for i in range(n))
+
+
+def _action_names(states: tuple[str, ...], d: int) -> tuple[str, ...] | None:
+    return tuple(f"{name}_velocity" for name in states) if len(states) == d else None
+
+
+def _flat(values: Array, taken: int) -> Array:
+    """The first samples of every start, (S taken, ...), the samples of a start one after the other."""
+    return values[:, :taken].reshape(-1, *values.shape[2:])
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -59,7 +59,7 @@ def test_fit_evaluate_rollout(run, movements, tmp_path):
     assert code == 0
     path = np.genfromtxt("rollout.csv", delimiter=",", names=True)
     assert path.dtype.names == ("t", "x1", "x2", "x1_velocity", "x2_velocity")
-    assert len(path) == 50
+    assert len(path) == 51
     np.testing.assert_allclose(path["x1"], 0.1)
     assert np.ptp(path["x2"]) > 0.01
     assert (tmp_path / "r.svg").exists()

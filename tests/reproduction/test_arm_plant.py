@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from reproduction.plants import arm
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.robots.task import TaskConstraint
+from unconstrain.robots import TaskConstraint
 
 postures = arrays(np.float64, (3, 7), elements=st.floats(-2.0, 2.0))
 
@@ -48,7 +48,7 @@ def test_the_policy_is_the_gradient_of_the_paper(p, x, slope):
 @settings(max_examples=10, deadline=None)
 @given(postures, st.sampled_from(["1-2-3", "4-5-6", "1-3-5", "2-4-6", "1,2,3"]))
 def test_projections_block_the_rows_and_nothing_else(Q, text):
-    constraint, J = TaskConstraint.of(text), arm.jacobian(Q)
+    constraint, J = TaskConstraint.parse(text), arm.jacobian(Q)
     N = constraint.projections(J)
     np.testing.assert_allclose(constraint.rows(J) @ N, 0, atol=1e-8)
     np.testing.assert_allclose(N @ N, N, atol=1e-10)
@@ -57,7 +57,7 @@ def test_projections_block_the_rows_and_nothing_else(Q, text):
 
 def test_projections_in_a_singular_posture():
     J = arm.jacobian(np.zeros((1, 7)))
-    N = TaskConstraint.of("1-2-3").projections(J)
+    N = TaskConstraint.parse("1-2-3").projections(J)
     assert np.trace(N[0]) == pytest.approx(7 - 1), "stretched out, the hand can move along x only"
 
 
@@ -99,19 +99,19 @@ def test_the_same_seed_gives_the_same_movements():
     ],
 )
 def test_constraints_as_users_write_them(given, selection):
-    constraint = TaskConstraint.of(given)
+    constraint = TaskConstraint.parse(given)
     np.testing.assert_allclose(constraint.selection, selection)
-    assert TaskConstraint.of(constraint) is constraint
+    assert TaskConstraint.parse(constraint) is constraint
 
 
 @pytest.mark.parametrize(("one", "other"), [("1-2-3", "4-5-6"), ("1-3-5", "2-4-6"), ("6", "1-2-3-4-5")])
 def test_complements_of_rows(one, other):
-    assert TaskConstraint.of(one).complement().name == other
-    assert TaskConstraint.of(other).complement().name == one
+    assert TaskConstraint.parse(one).complement().name == other
+    assert TaskConstraint.parse(other).complement().name == one
 
 
 def test_the_complement_of_a_plane_is_everything_else():
-    plane = TaskConstraint.of("1,1,0")
+    plane = TaskConstraint.parse("1,1,0")
     rest = plane.complement().selection
     assert rest.shape == (5, 6)
     np.testing.assert_allclose(rest @ plane.selection.T, 0, atol=1e-15)
@@ -120,17 +120,17 @@ def test_the_complement_of_a_plane_is_everything_else():
 @pytest.mark.parametrize(
     ("kind", "call", "sentence"),
     [
-        (UnconstrainError, lambda: TaskConstraint.of("1-2-7"), "no task row 7 as in '1-2-7'"),
-        (UnconstrainError, lambda: TaskConstraint.of("0-1"), "no task row 0"),
-        (UnconstrainError, lambda: TaskConstraint.of("1-1"), "named twice"),
-        (UnconstrainError, lambda: TaskConstraint.of("table"), "'table' is no constraint: give task rows"),
-        (UnconstrainError, lambda: TaskConstraint.of("1,2"), "is no constraint"),
-        (UnconstrainError, lambda: TaskConstraint.of("1,2,3; 1,2,3,4,5,6"), "is no constraint"),
-        (UnconstrainError, lambda: TaskConstraint.of("0,0,0"), "cannot be 0,0,0"),
-        (UnconstrainError, lambda: TaskConstraint.of("1-2-3-4-5-6").complement(), "leaves nothing free"),
-        (DataError, lambda: TaskConstraint.of("0,nan,1"), "NaN or infinity"),
-        (DataError, lambda: TaskConstraint.of(np.eye(4)), "or a matrix \\(k, 6\\), not \\(4, 4\\)"),
-        (DataError, lambda: TaskConstraint.of([["a"]]), "must be numbers"),
+        (UnconstrainError, lambda: TaskConstraint.parse("1-2-7"), "no task row 7 as in '1-2-7'"),
+        (UnconstrainError, lambda: TaskConstraint.parse("0-1"), "no task row 0"),
+        (UnconstrainError, lambda: TaskConstraint.parse("1-1"), "named twice"),
+        (UnconstrainError, lambda: TaskConstraint.parse("table"), "'table' is no constraint: give task rows"),
+        (UnconstrainError, lambda: TaskConstraint.parse("1,2"), "is no constraint"),
+        (UnconstrainError, lambda: TaskConstraint.parse("1,2,3; 1,2,3,4,5,6"), "is no constraint"),
+        (UnconstrainError, lambda: TaskConstraint.parse("0,0,0"), "cannot be 0,0,0"),
+        (UnconstrainError, lambda: TaskConstraint.parse("1-2-3-4-5-6").complement(), "leaves nothing free"),
+        (DataError, lambda: TaskConstraint.parse("0,nan,1"), "NaN or infinity"),
+        (DataError, lambda: TaskConstraint.parse(np.eye(4)), "or a matrix \\(k, 6\\), not \\(4, 4\\)"),
+        (DataError, lambda: TaskConstraint.parse([["a"]]), "must be numbers"),
         (DataError, lambda: arm.pose([[0.0] * 6]), "has 7 joints"),
         (DataError, lambda: arm.jacobian([[np.inf] * 7]), "NaN or infinity"),
         (UnconstrainError, lambda: arm.PowerPolicy(1.0), "a power above 1"),

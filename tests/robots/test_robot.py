@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.robots.robot import Robot, RobotError
+from unconstrain.robots import Robot, RobotError
 
 FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
 HAND = "panda_hand_tcp"

@@ -10,8 +10,8 @@ import pyarrow.csv
 import typer
 from rich.table import Table
 
-from reproduction import toy
 from unconstrain import atomic, metrics
+from unconstrain import demo as experiment
 from unconstrain.cli import reporting
 from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
@@ -37,14 +37,14 @@ def demo(
     except OSError as error:
         raise UnconstrainError(f"cannot make the folder {out}: {error.strerror}") from error
     with console.status("40 movements around a limit cycle, each bent by three unknown constraints"):
-        training, test = toy.data(0)
+        training, test = experiment.draw_data(0)
         rows = []
         for kind, name in ROWS.items():
-            policy = toy.learn(training, kind)
-            errors = toy.errors(policy, test)
+            policy = experiment.learn(training, kind)
+            errors = experiment.measure_errors(policy, test)
             share = metrics.explained(test.actions, policy.predict(test.states))
             rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}", f"{share:.2%}"))
-        picture = figures.save(toy.figure_3(), out / "limit-cycle.png")
+        picture = figures.save(experiment.plot_fields(), out / "limit-cycle.png")
         _write_csv(training, out / "movements.csv")
     columns = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explained")
     _write_markdown(columns, rows, out / "table.md")

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 
 from unconstrain import atomic
 from unconstrain.cli import recordings, reporting
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.fitting.posterior import Unsure
 from unconstrain.plot import policy as figures
 from unconstrain.policies import load_policy
-from unconstrain.simulation import Rollout
 from unconstrain.simulation import rollout as integrate
 
 
@@ -54,7 +54,7 @@ def rollout(
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
     begin = _numbers(start, "--start", learnt.n_features_in_)
     movement = integrate(learnt, begin, steps, dt, rows, stop_when=unsure)
-    taken = len(movement.actions)
+    taken = len(movement) - 1
     if unsure is not None and taken == 0:
         raise DataError(
             f"at the start already {_unsure_at(unsure, movement.states[0])}: start nearer to the recordings, or give a "
@@ -62,8 +62,8 @@ def rollout(
         )
 
     names = _names(learnt)
-    columns = {"t": movement.time[:-1]}
-    columns |= {name: movement.states[:-1, i] for i, name in enumerate(names)}
+    columns = {"t": movement.time}
+    columns |= {name: movement.states[:, i] for i, name in enumerate(names)}
     columns |= {f"{name}_velocity": movement.actions[:, i] for i, name in enumerate(names)}
     with atomic.replacing(out) as temporary:
         pyarrow.csv.write_csv(pa.table(columns), temporary)
@@ -104,18 +104,16 @@ def _names(policy) -> list[str]:
     return [f"x{i + 1}" for i in range(policy.n_features_in_)]
 
 
-def _drawn(movement: Rollout, names: list[str]) -> Figure:
+def _drawn(movement: Demonstrations, names: list[str]) -> Figure:
     """The path over the first two states, and every state against time."""
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     if len(names) > 1:
-        figures.trajectories(
-            left, movement.states, np.zeros(len(movement.states)), color=figures.LEARNT, style="-"
-        )
+        figures.trajectories(left, movement.states, movement.episodes, color=figures.LEARNT, style="-")
         left.set(xlabel=names[0], ylabel=names[1])
         left.set_aspect("equal", adjustable="datalim")
     else:
-        left.plot(movement.states[:-1, 0], movement.actions[:, 0], color=figures.LEARNT)
+        left.plot(movement.states[:, 0], movement.actions[:, 0], color=figures.LEARNT)
         left.set(xlabel=names[0], ylabel=f"{names[0]} velocity")
     for i, name in enumerate(names):
         right.plot(movement.time, movement.states[:, i], label=name)

@@ -1,17 +1,21 @@
-"""Robots described by MJCF or URDF, and the constraints that their tasks impose."""
+"""Robots from MJCF or URDF files, and constraints on what their hands may do."""
 
 from typing import TYPE_CHECKING
 
 from unconstrain import lazy
 
 if TYPE_CHECKING:
-    from unconstrain.robots.robot import Robot, RobotError
+    from unconstrain.errors import RobotError
+    from unconstrain.robots.robot import Robot
+    from unconstrain.robots.simulator import import_mujoco
     from unconstrain.robots.task import TaskConstraint
 
-__all__ = ["Robot", "RobotError", "TaskConstraint"]
+__all__ = ["Robot", "RobotError", "TaskConstraint", "import_mujoco"]
 
 _HOMES = {
-    "unconstrain.robots.robot": ("Robot", "RobotError"),
+    "unconstrain.errors": ("RobotError",),
+    "unconstrain.robots.robot": ("Robot",),
+    "unconstrain.robots.simulator": ("import_mujoco",),
     "unconstrain.robots.task": ("TaskConstraint",),
 }
 

@@ -1,7 +1,7 @@
-"""What a hand may not do: constraints on the motion of an end-effector, and what they mean for the joints.
+"""Constraints on the motion of a robot's hand, and what they mean for its joints.
 
-A hand moves with velocity v (m/s) and angular velocity ω (rad/s), together six numbers, numbered 1 to 6. A
-constraint blocks k combinations of them, ``S (v, ω) = 0``; through the Jacobian, ``(v, ω) = J q̇``, it
+A hand moves with velocity v (m/s) and angular velocity ω (rad/s), together six numbers, counted from 1 to 6. A
+constraint blocks k combinations of them, ``S (v, ω) = 0``. Through the Jacobian, ``(v, ω) = J q̇``, it
 becomes rows ``A = S J`` with ``A q̇ = 0`` over the joints.
 """
 
@@ -10,34 +10,34 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import null_space
 
-from unconstrain.constraints import projection
+from unconstrain.constraints.nullspace import projection
 from unconstrain.errors import DataError, UnconstrainError
 
 Array = NDArray[np.float64]
 
 ROWS = re.compile(r"[0-9]+(-[0-9]+)*")
+"""How task rows are written: "1-2-3"."""
 
 
 @dataclass(frozen=True, eq=False)
 class TaskConstraint:
-    """Which combinations of a hand's velocities are blocked.
+    """The combinations of a hand's velocities that are blocked.
 
-    Attributes
+    Parameters
     ----------
     selection : array (k, 6)
         S, over the three velocities and the three angular velocities in the world.
     name : str
-        As the user wrote it.
+        The constraint as the user wrote it.
 
     Examples
     --------
-    >>> TaskConstraint.of("1-2-3").selection.shape          # the hand stays in place and may turn
+    >>> TaskConstraint.parse("1-2-3").selection.shape          # the hand stays in place and may turn
     (3, 6)
-    >>> TaskConstraint.of("0,0,1").selection                # the hand slides on a level table
+    >>> TaskConstraint.parse("0,0,1").selection                # the hand slides on a level table
     array([[0., 0., 1., 0., 0., 0.]])
-    >>> TaskConstraint.of("1-3-5").complement().name        # what the other leaves free
+    >>> TaskConstraint.parse("1-3-5").complement().name        # what the other leaves free
     '2-4-6'
     """
 
@@ -45,8 +45,8 @@ class TaskConstraint:
     name: str
 
     @classmethod
-    def of(cls, given: "str | ArrayLike | TaskConstraint") -> "TaskConstraint":
-        """The constraint that a user means.
+    def parse(cls, given: "str | ArrayLike | TaskConstraint") -> "TaskConstraint":
+        """Understand a constraint as a user writes it.
 
         Parameters
         ----------
@@ -55,12 +55,16 @@ class TaskConstraint:
             (3,), of any length but zero; or a matrix S, an array (k, 6) or its rows as text,
             ``"1,0,0,0,0,0; 0,0,1,0,0,0"``.
 
+        Returns
+        -------
+        TaskConstraint
+
         Raises
         ------
         UnconstrainError
-            The text is none of these, a row is not one of 1 to 6, or a normal is zero.
+            If the text is none of these, a row is not one of 1 to 6, or a normal is zero.
         DataError
-            An array is of another shape or not finite.
+            If an array has another shape or is not finite.
         """
         if isinstance(given, TaskConstraint):
             return given
@@ -95,23 +99,52 @@ class TaskConstraint:
         return cls(np.eye(6)[np.array(rows) - 1], text)
 
     def rows(self, jacobians: Array) -> Array:
-        """``A = S J``: constraint rows (N, k, n) over the joints, for the hand's Jacobians (N, 6, n)."""
+        """Compute the constraint rows over the joints, ``A = S J``.
+
+        Parameters
+        ----------
+        jacobians : array (N, 6, n)
+            Of the hand, as `Robot.jacobian` gives them.
+
+        Returns
+        -------
+        array (N, k, n)
+        """
         return self.selection @ jacobians
 
     def projections(self, jacobians: Array) -> Array:
-        """``N = I - A⁺A`` (N, n, n) for the hand's Jacobians (N, 6, n); right in singular postures as well."""
+        """Compute the nullspace projections over the joints, ``N = I - A⁺A``, in singular postures as well.
+
+        Parameters
+        ----------
+        jacobians : array (N, 6, n)
+            Of the hand, as `Robot.jacobian` gives them.
+
+        Returns
+        -------
+        array (N, n, n)
+        """
         return projection(self.rows(jacobians))
 
     def complement(self) -> "TaskConstraint":
-        """The constraint that blocks exactly what this one leaves free: 4-5-6 for 1-2-3.
+        """Return the constraint that blocks exactly what this one leaves free: 4-5-6 for 1-2-3.
 
-        Raises `UnconstrainError` where this one leaves nothing free.
+        Returns
+        -------
+        TaskConstraint
+
+        Raises
+        ------
+        UnconstrainError
+            If this constraint leaves nothing free.
         """
         chosen = np.flatnonzero(self.selection.any(axis=0))
         if len(chosen) == len(self.selection) and np.all(self.selection.sum(axis=0)[chosen] == 1):
             rows = [row for row in range(1, 7) if row - 1 not in chosen]
             rest, name = np.eye(6)[np.array(rows, dtype=int) - 1], "-".join(map(str, rows))
         else:
+            from scipy.linalg import null_space  # costs more to import than all else here
+
             rest, name = null_space(self.selection).T, f"complement of {self.name}"
         if not len(rest):
             raise UnconstrainError(f"the constraint {self.name} leaves nothing free, so it has no complement")

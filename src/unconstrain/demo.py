@@ -1,0 +1,117 @@
+"""The limit cycle, learnt from 40 constrained movements: what `unconstrain demo` shows, and Fig. 3 of the paper."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from unconstrain import metrics
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.features import NormalizedRBF
+from unconstrain.limit_cycle import LimitCycle, demonstrate
+from unconstrain.plot import policy as plots
+from unconstrain.policies import ParametricPolicy
+
+MOVEMENTS, FEW = 40, 4
+"""Movements in a data set, and in a small one."""
+
+WIDTH = 0.8
+"""σ of the RBFs, twice the spacing of their 6 x 6 grid over [-1, 1]²: one for everything in this experiment."""
+
+
+def draw_data(seed: int, noise: float = 0.0) -> tuple[Demonstrations, Demonstrations]:
+    """Simulate a data set: 40 movements to learn from, and 40 others, without noise, to test on.
+
+    Parameters
+    ----------
+    seed : int
+        Number of the data set.
+    noise : float
+        Of the recorded actions to learn from, as for `limit_cycle.demonstrate`.
+
+    Returns
+    -------
+    training, test : Demonstrations
+    """
+    training = demonstrate(MOVEMENTS, noise=noise, random_state=np.random.default_rng([seed, 0]))
+    return training, demonstrate(MOVEMENTS, random_state=np.random.default_rng([seed, 1]))
+
+
+def make_policy(risk: str = "inconsistency") -> ParametricPolicy:
+    """Make the model of this experiment: 36 normalised RBFs, λ by cross-validation of the risk."""
+    axis = np.linspace(-1.0, 1.0, 6)
+    centers = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    return ParametricPolicy(NormalizedRBF(centers=centers, width=WIDTH), risk=risk, alpha="cv")
+
+
+def learn(
+    training: Demonstrations, way: str = "inconsistency", movements: int = MOVEMENTS
+) -> ParametricPolicy:
+    """Learn the policy behind the first movements.
+
+    Parameters
+    ----------
+    training : Demonstrations
+    way : str
+        "inconsistency", "direct", or "oracle", which is regression on the true policy itself.
+    movements : int
+        How many of them to learn from.
+    """
+    seen = training.select(training.episodes < movements)
+    if way == "oracle":
+        return make_policy("direct").fit(seen.states, seen.policy, groups=seen.episodes)
+    return make_policy(way).fit(seen.states, seen.actions, groups=seen.episodes)
+
+
+def measure_errors(policy: ParametricPolicy, test: Demonstrations) -> dict[str, float]:
+    """Measure nUPE and nCPE on movements that were not learnt from, by name."""
+    truth, predicted = test.policy, policy.predict(test.states)
+    return {
+        "nUPE": metrics.normalized(metrics.unconstrained_policy_error(truth, predicted), truth),
+        "nCPE": metrics.normalized(
+            metrics.constrained_policy_error(truth, predicted, test.projections), truth
+        ),
+    }
+
+
+def plot_fields(captions: Mapping[str, str] | None = None) -> Figure:
+    """Plot the true policy, those learnt from 4 and from 40 movements, and ordinary regression, of data set 0.
+
+    Parameters
+    ----------
+    captions : mapping, optional
+        What to write below a panel, by what it shows: "inconsistency, 4 trajectories", and so on. By default the
+        errors of that policy.
+    """
+    training, test = draw_data(0)
+    free = demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))
+    panels = [
+        ("learnt, {} movements", "inconsistency", FEW, plots.LEARNT),
+        ("learnt, {} movements", "inconsistency", MOVEMENTS, plots.LEARNT),
+        ("ordinary regression", "direct", MOVEMENTS, plots.DIRECT),
+    ]
+    figure = Figure(figsize=(14.0, 4.3), layout="constrained")
+    first, *others = figure.subplots(1, 4)
+    # The length of the arrows halfway between the cycle and the corners: those at the corners may overlap.
+    longest = float(np.linalg.norm(LimitCycle()(np.array([[0.8, 0.8]]))))
+    plots.trajectories(first, free.states, free.episodes)
+    plots.field(first, LimitCycle(), color=plots.TRUE, longest=longest)
+    first.set_title("true policy", fontsize=12)
+    first.set_xlabel("x1")
+    for ax, (title, way, movements, color) in zip(others, panels, strict=True):
+        policy = learn(training, way, movements)
+        shown = training.select(training.episodes < movements)
+        plots.trajectories(ax, shown.states, shown.episodes)
+        plots.field(ax, policy, color=color, longest=longest)
+        ax.set_title(title.format(movements), fontsize=12)
+        if captions is None:
+            caption = "   ".join(
+                f"{name} {value:.2g}" for name, value in measure_errors(policy, test).items()
+            )
+        else:
+            caption = captions[f"{way}, {movements} trajectories"]
+        ax.set_xlabel(f"x1\n{caption}")
+    for ax in figure.axes:
+        ax.set_aspect("equal", adjustable="box")
+        ax.set(xlim=(-1.2, 1.2), ylim=(-1.2, 1.2), xticks=(-1, 0, 1), yticks=(-1, 0, 1))
+    return figure

@@ -31,14 +31,28 @@ def draw_data(seed: int, noise: float = 0.0) -> tuple[Demonstrations, Demonstrat
 
     Returns
     -------
-    training, test : Demonstrations
+    training : Demonstrations
+        40 movements, with noise.
+    test : Demonstrations
+        40 others, without.
     """
     training = demonstrate(MOVEMENTS, noise=noise, random_state=np.random.default_rng([seed, 0]))
     return training, demonstrate(MOVEMENTS, random_state=np.random.default_rng([seed, 1]))
 
 
 def make_policy(risk: str = "inconsistency") -> ParametricPolicy:
-    """Make the model of this experiment: 36 normalised RBFs, λ by cross-validation of the risk."""
+    """Make the model of this experiment: 36 normalised RBFs, λ by cross-validation of the risk.
+
+    Parameters
+    ----------
+    risk : str
+        That the policy is fitted by.
+
+    Returns
+    -------
+    ParametricPolicy
+        Not fitted yet.
+    """
     axis = np.linspace(-1.0, 1.0, 6)
     centers = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     return ParametricPolicy(NormalizedRBF(centers=centers, width=WIDTH), risk=risk, alpha="cv")
@@ -52,10 +66,16 @@ def learn(
     Parameters
     ----------
     training : Demonstrations
+        With the true policy, if `way` is "oracle".
     way : str
         "inconsistency", "direct", or "oracle", which is regression on the true policy itself.
     movements : int
         How many of them to learn from.
+
+    Returns
+    -------
+    ParametricPolicy
+        Fitted.
     """
     seen = training.select(training.episodes < movements)
     if way == "oracle":
@@ -64,8 +84,23 @@ def learn(
 
 
 def measure_errors(policy: ParametricPolicy, test: Demonstrations) -> dict[str, float]:
-    """Measure nUPE and nCPE on movements that were not learnt from, by name."""
+    """Measure the paper's errors on movements that were not learnt from.
+
+    Parameters
+    ----------
+    policy : ParametricPolicy
+        Fitted.
+    test : Demonstrations
+        With the true policy and projections.
+
+    Returns
+    -------
+    dict of str to float
+        "nUPE" and "nCPE", without and with constraints, as shares of the true policy's variance.
+    """
     truth, predicted = test.policy, policy.predict(test.states)
+    assert truth is not None
+    assert test.projections is not None
     return {
         "nUPE": metrics.normalized(metrics.unconstrained_policy_error(truth, predicted), truth),
         "nCPE": metrics.normalized(
@@ -82,6 +117,11 @@ def plot_fields(captions: Mapping[str, str] | None = None) -> Figure:
     captions : mapping, optional
         What to write below a panel, by what it shows: "inconsistency, 4 trajectories", and so on. By default the
         errors of that policy.
+
+    Returns
+    -------
+    Figure
+        Four panels side by side.
     """
     training, test = draw_data(0)
     free = demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))

@@ -24,19 +24,19 @@ class LimitCycle:
 
     which is also right at the origin. The circle has radius √ρ and is travelled clockwise.
 
-    Attributes
+    Parameters
     ----------
     rho : float
-        ρ, squared radius of the cycle.
+        Squared radius ρ of the cycle.
     omega : float
-        ω in rad/s.
+        Angular velocity ω in rad/s.
     """
 
     rho: float = 0.5
     omega: float = 1.0
 
     def __call__(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Actions (N, 2) at states (N, 2)."""
+        """Return the actions (N, 2) at states X (N, 2)."""
         X = np.asarray(X, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != 2:
             raise DataError(f"the limit cycle moves in the plane: give states of shape (N, 2), not {X.shape}")
@@ -54,7 +54,7 @@ def demonstrate(
     constrained: bool = True,
     random_state: int | np.random.Generator | None = None,
 ) -> Demonstrations:
-    """Movements of the limit cycle, each under three random constraints, one after the other.
+    """Simulate movements of the limit cycle, each under three random constraints, one after the other.
 
     Starts are uniform in [-1, 1]². The constraint ``A = (α1, α2)``, ``α ~ N(0, 1)``, is drawn anew in each
     third of a trajectory; the action is ``u = N π(x)`` and the state moves by ``u / rate``.

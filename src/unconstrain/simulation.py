@@ -19,10 +19,10 @@ Array = NDArray[np.float64]
 
 
 class Predictor(Protocol):
-    """What has a `predict` method: a fitted policy of this library, or any regressor."""
+    """Anything with a `predict` method: a fitted policy of this library, or any regressor."""
 
     def predict(self, X: Any, /) -> Any:
-        """Actions (S, d) at states X (S, n)."""
+        """Predict actions (S, d) at states X (S, n)."""
 
 
 Policy = Predictor | Callable[[Array], ArrayLike]
@@ -241,7 +241,7 @@ def check_memory(starts: int, samples: int, n: int, d: int, *, constrained: bool
 
 
 def _whole(steps: Any) -> int:
-    """The number of steps as an int, -1 where it is none."""
+    """Return the number of steps as an int, -1 if it is not a whole number."""
     try:
         return -1 if isinstance(steps, bool) or steps != int(steps) else int(steps)
     except (TypeError, ValueError, OverflowError):
@@ -278,7 +278,7 @@ def _checked_start(start: ArrayLike, expected: int | None) -> Array:
 
 
 def _memory() -> int:
-    """This computer's memory in bytes; 8 GB where the system does not say."""
+    """Ask the system for this computer's memory in bytes; assume 8 GB if it does not say."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
@@ -333,7 +333,7 @@ def _action_names(states: tuple[str, ...], d: int) -> tuple[str, ...] | None:
 
 
 def _flat(values: Array, taken: int) -> Array:
-    """The first samples of every start, (S taken, ...), the samples of a start one after the other."""
+    """Put the first samples of every start one after the other, (S taken, ...)."""
     return values[:, :taken].reshape(-1, *values.shape[2:])
 
 

@@ -266,7 +266,7 @@ def test_without_the_extra_the_experiment_says_what_it_left_out(tmp_path, monkey
     def missing():
         raise uc.errors.UnconstrainError("robots are simulated by MuJoCo, which is not here")
 
-    monkeypatch.setattr(constraints, "simulator", missing)
+    monkeypatch.setattr(constraints, "import_mujoco", missing)
     outcome = constraints.reproduce(tmp_path, trials=1, console=Console(quiet=True), data=tmp_path)
     assert (
         "Measured constraints are left out: robots are simulated by MuJoCo, which is not here."

@@ -30,12 +30,14 @@ def read_spec(
     Parameters
     ----------
     path : str or path
+        Of the file.
     package_dirs : iterable of str or path
         Folders where ``package://`` meshes of a URDF are looked for.
 
     Returns
     -------
     spec : mujoco.MjSpec
+        Of the robot, all its joints free to move.
     notes : list of str
         What was left out in reading, a sentence each.
 
@@ -133,7 +135,7 @@ def _is_physical(inertial: ET.Element) -> bool:
 
 
 def _with_compiler(root: ET.Element) -> ET.Element:
-    """A copy of the URDF that tells MuJoCo to keep shapes made for the eye."""
+    """Copy the URDF, and tell MuJoCo in it to keep shapes made for the eye."""
     root = copy.deepcopy(root)
     extension = root.find("mujoco")
     extension = ET.SubElement(root, "mujoco") if extension is None else extension

@@ -105,6 +105,7 @@ class Robot:
         Parameters
         ----------
         path : str or path
+            Of the file.
         lock : iterable of str, or mapping from str to float
             Joints to hold still, as for `Robot`.
         package_dirs : iterable of str or path
@@ -114,6 +115,7 @@ class Robot:
         Returns
         -------
         Robot
+            Ready for poses and Jacobians.
 
         Raises
         ------

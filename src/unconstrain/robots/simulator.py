@@ -12,6 +12,7 @@ def import_mujoco() -> ModuleType:
     Returns
     -------
     module
+        The package.
 
     Raises
     ------
@@ -35,5 +36,16 @@ def import_mujoco() -> ModuleType:
 
 
 def one_line(error: Exception) -> str:
-    """Return the text of MuJoCo's error, which may have several lines, in one."""
+    """Put the text of MuJoCo's error, which may have several lines, into one.
+
+    Parameters
+    ----------
+    error : Exception
+        Raised by MuJoCo, or in reading a file.
+
+    Returns
+    -------
+    str
+        The text, its white space single blanks.
+    """
     return " ".join(str(error).split())

@@ -58,6 +58,7 @@ class TaskConstraint:
         Returns
         -------
         TaskConstraint
+            With the text as its name; a `TaskConstraint` is returned as it is.
 
         Raises
         ------
@@ -109,6 +110,7 @@ class TaskConstraint:
         Returns
         -------
         array (N, k, n)
+            A, one matrix for each Jacobian.
         """
         return self.selection @ jacobians
 
@@ -123,6 +125,7 @@ class TaskConstraint:
         Returns
         -------
         array (N, n, n)
+            N, one matrix for each Jacobian.
         """
         return projection(self.rows(jacobians))
 
@@ -132,6 +135,7 @@ class TaskConstraint:
         Returns
         -------
         TaskConstraint
+            Its rows span the rest of the six velocities.
 
         Raises
         ------

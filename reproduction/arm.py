@@ -11,9 +11,8 @@ from reproduction import arm_tables, arm_trials
 from reproduction.arm_figures import table_figure
 from reproduction.outcome import Outcome
 from reproduction.trials import run_trials
-from unconstrain import atomic
+from unconstrain import atomic, plot
 from unconstrain.errors import UnconstrainError
-from unconstrain.plot import policy as figures
 from unconstrain.robots import TaskConstraint
 
 TRIALS = 100
@@ -92,7 +91,7 @@ def reproduce(
     written = out / f"{name}.json"
     with atomic.replacing(written) as temporary:
         temporary.write_text(json.dumps({"settings": settings, "trials": results}, indent=1))
-    pictures = [figures.save(table_figure(results), out / f"{name}{suffix}") for suffix in (".png", ".svg")]
+    pictures = [plot.save(table_figure(results), out / f"{name}{suffix}") for suffix in (".png", ".svg")]
     if model == "auto":
         return Outcome(
             title="The arm, model chosen by inconsistency alone",

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from reproduction import published
 from reproduction.arm_tables import ERRORS, constraints, nonlinear, values
-from unconstrain.plot import policy as figures
+from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
 
 ORACLE = "#009E73"
 
@@ -18,13 +18,13 @@ def table_figure(results: Sequence[dict[str, dict[str, Any]]]) -> Figure:
     has = next(iter(results[0].values()))
     series = (
         [
-            ("chosen by inconsistency", "auto", figures.LEARNT, "o"),
+            ("chosen by inconsistency", "auto", LEARNT, "o"),
             ("local models", "locally linear", ORACLE, "^"),
         ]
         if "chosen" in has
         else [
-            ("inconsistency", "inconsistency", figures.LEARNT, "o"),
-            ("direct", "direct", figures.DIRECT, "v"),
+            ("inconsistency", "inconsistency", LEARNT, "o"),
+            ("direct", "direct", DIRECT, "v"),
             ("oracle", "oracle", ORACLE, "^"),
         ]
     )
@@ -35,7 +35,7 @@ def table_figure(results: Sequence[dict[str, dict[str, Any]]]) -> Figure:
     for ax, error in zip(figure.subplots(1, len(ERRORS), sharey=True), ERRORS, strict=True):
         if known.any():
             means, spreads = np.array([published.ARM[key][error] for key in rows if key in published.ARM]).T
-            _points(ax, at[known] - 0.24, means, spreads, color=figures.TRUE, fmt="s", label="published")
+            _points(ax, at[known] - 0.24, means, spreads, color=TRUE, fmt="s", label="published")
         for i, (label, name, color, marker) in enumerate(series):
             numbers = np.array([values(results, *key, f"{name} {error}") for key in rows])
             _points(

@@ -17,8 +17,8 @@ from reproduction.plants.arm import PowerPolicy
 from reproduction.plants.arm_dynamics import GRIPPED, SCENARIOS, TABLE
 from reproduction.plants.rendering import Camera, NoOpenGL
 from reproduction.trials import run_trials
-from unconstrain import atomic
-from unconstrain.plot import policy as figures
+from unconstrain import atomic, plot
+from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 from unconstrain.robots import import_mujoco
 from unconstrain.selection import select_policy
 
@@ -110,12 +110,12 @@ def reproduce(out: Path, *, trials: int | None, jobs: int, console: Console) -> 
         temporary.write_text(json.dumps({"settings": SETTINGS, "trials": results}, indent=1))
     pictures, files = {}, [written, out / "physics.jsonl"]
     caption = f"nUPE in physics: {len(results)} data sets of each scenario."
-    pictures[figures.save(error_figure(results), out / "physics.png")] = caption
-    files.append(figures.save(error_figure(results), out / "physics.svg"))
+    pictures[plot.save(error_figure(results), out / "physics.png")] = caption
+    files.append(plot.save(error_figure(results), out / "physics.svg"))
     findings = _findings(results)
     try:
         frames = frame_figure()
-        pictures[figures.save(frames, out / "frames.png")] = (
+        pictures[plot.save(frames, out / "frames.png")] = (
             "Frames of the first movement: the hand gripped, and sliding on a table."
         )
     except NoOpenGL as error:
@@ -179,7 +179,7 @@ def _findings(results: list[dict[str, dict[str, Any]]]) -> tuple[str, ...]:
 def error_figure(results: list[dict[str, dict[str, Any]]]) -> Figure:
     """nUPE of every data set, by way of learning; log scale."""
     figure = Figure(figsize=(8.4, 3.8), layout="constrained")
-    colors = {"direct": figures.DIRECT, "inconsistency": figures.RECORDED, "auto": figures.LEARNT}
+    colors = {"direct": DIRECT, "inconsistency": RECORDED, "auto": LEARNT}
     for ax, scenario in zip(figure.subplots(1, 2, sharey=True), SCENARIOS, strict=True):
         for i, name in enumerate(METHODS):
             numbers = _numbers(results, scenario, f"{name} nUPE")

@@ -29,8 +29,8 @@ from reproduction.constraints_trials import (
 )
 from reproduction.outcome import Outcome, write_results
 from reproduction.trials import run_trials
+from unconstrain import plot
 from unconstrain.errors import UnconstrainError
-from unconstrain.plot import policy as figures
 from unconstrain.robots import import_mujoco
 
 TRIALS = 50
@@ -109,10 +109,8 @@ def reproduce(
 
     table = "\n\n".join(tables) + "\n"
     files = write_results(out, kept, table)
-    shown = {
-        figures.save(figure, out / f"{name}.png"): caption for name, (figure, caption) in pictures.items()
-    }
-    drawn = [figures.save(figure, out / f"{name}.svg") for name, (figure, _) in pictures.items()]
+    shown = {plot.save(figure, out / f"{name}.png"): caption for name, (figure, caption) in pictures.items()}
+    drawn = [plot.save(figure, out / f"{name}.svg") for name, (figure, _) in pictures.items()]
     return Outcome(
         title="Constraints learnt, measured and used",
         table=table,

@@ -6,11 +6,11 @@ from matplotlib.figure import Figure
 from reproduction.constraints_surfaces import CENTERS, Surfaces
 from reproduction.constraints_trials import KINDS, NOISE, SWEPT
 from unconstrain.constraints.learnt import FeatureConstraint
+from unconstrain.constraints.learnt.lines import align
 from unconstrain.features import NormalizedRBF
-from unconstrain.plot import policy as figures
-from unconstrain.plot.constraint import aligned
+from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 
-COLORS = (figures.LEARNT, figures.DIRECT, "#009E73", "#CC79A7")
+COLORS = (LEARNT, DIRECT, "#009E73", "#CC79A7")
 TASK = ("x", "y", "z", "ωx", "ωy", "ωz")
 NORMAL_LENGTH = 0.02
 """Of the drawn normals, in metres."""
@@ -73,7 +73,7 @@ def measured(results: list[dict]) -> Figure:
         for side, name, color, label in zip(
             (-0.18, 0.18),
             names,
-            (figures.RECORDED, figures.LEARNT),
+            (RECORDED, LEARNT),
             ("inconsistency", "constraints known"),
             strict=True,
         ):
@@ -104,19 +104,17 @@ def surfaces(found: Surfaces) -> Figure:
     ):
         ax = figure.add_subplot(1, 3, place + 1, projection="3d")
         X, step = D.states, max(1, len(D) // 60)
-        up = aligned(n)
+        up = align(n)
         up = up * (np.sign(up[:, 2].mean()) or 1.0)
-        ax.scatter(*X[::4].T, s=5, color=figures.RECORDED, alpha=0.5, linewidths=0)
-        ax.quiver(*X[::step].T, *up[::step].T, length=NORMAL_LENGTH, color=figures.LEARNT, linewidth=1.0)
+        ax.scatter(*X[::4].T, s=5, color=RECORDED, alpha=0.5, linewidths=0)
+        ax.quiver(*X[::step].T, *up[::step].T, length=NORMAL_LENGTH, color=LEARNT, linewidth=1.0)
         ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", title=title)
         ax.set_aspect("equal")
         ax.set_box_aspect(None, zoom=0.95)
         ax.locator_params(nbins=3)
     ax = figure.add_subplot(1, 3, 3)
-    ax.plot(
-        CENTERS, [found.curved_errors[f"{n} RBFs"] for n in CENTERS], "o-", color=figures.LEARNT, label="RBFs"
-    )
-    ax.axhline(found.curved_errors["constant row"], color=figures.DIRECT, ls="--", label="constant row")
+    ax.plot(CENTERS, [found.curved_errors[f"{n} RBFs"] for n in CENTERS], "o-", color=LEARNT, label="RBFs")
+    ax.axhline(found.curved_errors["constant row"], color=DIRECT, ls="--", label="constant row")
     ax.set(xlabel="number of RBFs", ylabel="nPOE, blocks held out", title="curved surface")
     ax.set_xticks(CENTERS)
     ax.set_ylim(bottom=0)

@@ -13,9 +13,9 @@ from rich.console import Console
 from reproduction.errors import both
 from reproduction.outcome import Outcome
 from reproduction.plants.finger import Box, Finger
-from unconstrain import atomic
+from unconstrain import atomic, plot
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.plot import policy as figures
+from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
 from unconstrain.policies import ParametricPolicy
 
 STARTS = ((0.9, 0.8, 0.7), (0.7, 1.0, 0.6), (1.0, 0.6, 0.8), (0.55, 1.1, 0.9))
@@ -65,7 +65,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
             results[kind] = both(unseen, policies[kind].predict(unseen.states))
         figure = figure_1(finger, free, blocked, seen, policies["inconsistency"], policies["direct"])
         out.mkdir(parents=True, exist_ok=True)
-        png, svg = (figures.save(figure, out / f"fig1{suffix}") for suffix in (".png", ".svg"))
+        png, svg = (plot.save(figure, out / f"fig1{suffix}") for suffix in (".png", ".svg"))
         with atomic.replacing(out / "errors.json") as temporary:
             temporary.write_text(json.dumps(results, indent=1) + "\n")
     held = np.linalg.norm(finger.policy(seen.states) - seen.actions, axis=1) > 1e-9
@@ -105,21 +105,23 @@ def figure_1(
     panels["blocked"].set_title("(b) an obstacle in the way", fontsize=11)
 
     X = blocked.states[::12]
-    _arrows(panels["fields"], X, finger.policy(X), figures.DIRECT, "policy π")
-    _arrows(panels["fields"], X, blocked.actions[::12], figures.TRUE, "recorded u = Nπ")
+    _arrows(panels["fields"], X, finger.policy(X), DIRECT, "policy π")
+    _arrows(panels["fields"], X, blocked.actions[::12], TRUE, "recorded u = Nπ")
     for movement, color, label in (
-        (free, figures.DIRECT, "free"),
-        (blocked, figures.TRUE, "along the obstacle"),
+        (free, DIRECT, "free"),
+        (blocked, TRUE, "along the obstacle"),
     ):
-        figures.trajectories(panels["fields"], movement.states, movement.episodes, color=color, label=label)
+        plot.trajectory(
+            movement.states, episodes=movement.episodes, color=color, label=label, ax=panels["fields"]
+        )
     panels["fields"].set_title("(c) one policy, two behaviours", fontsize=11)
 
     picked = slice(None, None, 40)
-    figures.trajectories(panels["learnt"], seen.states, seen.episodes, label="recorded movements")
+    plot.trajectory(seen.states, episodes=seen.episodes, label="recorded movements", ax=panels["learnt"])
     X = seen.states[picked]
-    _arrows(panels["learnt"], X, finger.policy(X), figures.TRUE, "policy π", width=0.011)
-    _arrows(panels["learnt"], X, direct.predict(X), figures.DIRECT, "ordinary regression")
-    _arrows(panels["learnt"], X, learnt.predict(X), figures.LEARNT, "learnt", width=0.005)
+    _arrows(panels["learnt"], X, finger.policy(X), TRUE, "policy π", width=0.011)
+    _arrows(panels["learnt"], X, direct.predict(X), DIRECT, "ordinary regression")
+    _arrows(panels["learnt"], X, learnt.predict(X), LEARNT, "learnt", width=0.005)
     panels["learnt"].set_title(f"(d) learnt from {seen.n_episodes} obstacles", fontsize=11)
     for name in ("fields", "learnt"):
         panels[name].set(xlabel="joint 1 (rad)", ylabel="joint 2 (rad)")
@@ -136,7 +138,7 @@ def _movement(ax: Axes, finger: Finger, movement: Demonstrations, box: Box | Non
     for i, q in enumerate(frames):
         # Mixed with white, not transparent: phalanges overlap at the joints. As thick as it is, the finger touches.
         shade = 0.2 + 0.8 * i / (len(frames) - 1)
-        face = 1 - shade * (1 - np.array(to_rgb(figures.LEARNT)))
+        face = 1 - shade * (1 - np.array(to_rgb(LEARNT)))
         for outline in finger.outlines(q):
             ax.add_patch(Polygon(outline, facecolor=tuple(face), edgecolor="white", lw=0.6, zorder=2 + i))
         ax.plot(*finger.joints(q[None])[0, :-1].T, "o", color="white", ms=2.5, zorder=2 + i)

@@ -14,7 +14,8 @@ from reproduction.plants.grasping import FREQUENCY, Demonstrator, Recording
 from reproduction.plants.rendering import Camera, NoOpenGL
 from reproduction.plants.scene import BALL_DIAMETER, show
 from reproduction.plants.whole_body import WholeBody, floating
-from unconstrain.plot import policy as figures
+from unconstrain import plot
+from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
 
 Array = NDArray[np.float64]
 
@@ -88,9 +89,9 @@ def unconstrained_reaching(
     `policies` maps "expert", "inconsistency" and "direct" to callables or fitted policies over hand positions.
     """
     style = {
-        "expert": {"color": figures.TRUE, "ls": (0, (4, 2)), "lw": 2.0, "zorder": 5},
-        "inconsistency": {"color": figures.LEARNT, "ls": "-", "lw": 2.6, "zorder": 4},
-        "direct": {"color": figures.DIRECT, "ls": "-", "lw": 2.0, "zorder": 3},
+        "expert": {"color": TRUE, "ls": (0, (4, 2)), "lw": 2.0, "zorder": 5},
+        "inconsistency": {"color": LEARNT, "ls": "-", "lw": 2.6, "zorder": 4},
+        "direct": {"color": DIRECT, "ls": "-", "lw": 2.0, "zorder": 3},
     }
     paths = {
         name: moved(demonstrator, policy, None).demonstrations.states.reshape(-1, 2, 3)
@@ -188,8 +189,8 @@ def write(
     Fig. 5 shows the first training movement that meets the barrier and reaches the ball.
     """
     reaching = unconstrained_reaching(demonstrator, training, policies)
-    figures.save(reaching, out / "fig6.png")
-    figures.save(reaching, out / "fig6.svg")
+    plot.save(reaching, out / "fig6.png")
+    plot.save(reaching, out / "fig6.svg")
     captions = {
         "fig5": "Fig. 5 anew: a constrained demonstration; the robot reaches through the gap for the ball.",
         "fig6": "Fig. 6 anew: unconstrained reaching by the expert and both learnt policies, over ten of the "
@@ -203,8 +204,8 @@ def write(
     left_out: tuple[str, ...] = ()
     drawn = ["fig6"]
     try:
-        figures.save(reaching_through(demonstrator, training, obstacle, movement), out / "fig5.png")
-        figures.save(through_unseen_gap(demonstrator, policies), out / "unseen.png")
+        plot.save(reaching_through(demonstrator, training, obstacle, movement), out / "fig5.png")
+        plot.save(through_unseen_gap(demonstrator, policies), out / "unseen.png")
         drawn = list(captions)
     except NoOpenGL as error:
         left_out = (f"Pictures of the robot are left out: {error}.",)

@@ -12,7 +12,7 @@ from reproduction import identifiability_trials as trying
 from reproduction.identifiability_surfaces import FILES, Surface, surfaces
 from reproduction.outcome import Outcome, write_results
 from reproduction.trials import run_trials
-from unconstrain.plot import policy as figures
+from unconstrain import plot
 
 TRIALS = 20
 
@@ -67,7 +67,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
             "A finger on two surfaces: the direction least seen at a state, and the normal of the recording's own "
             "points there.",
         )
-    written = {name: figures.save(figure, out / f"{name}.png") for name, (figure, _) in pictures.items()}
+    written = {name: plot.save(figure, out / f"{name}.png") for name, (figure, _) in pictures.items()}
     return Outcome(
         title="What recordings cannot tell",
         table=table,

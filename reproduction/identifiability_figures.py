@@ -7,11 +7,10 @@ from matplotlib.figure import Figure
 
 from reproduction import identifiability_trials as trying
 from reproduction.identifiability_surfaces import Surface
-from unconstrain import demo
+from unconstrain import demo, plot
 from unconstrain import limit_cycle as plant
 from unconstrain.diagnostics import identifiability
-from unconstrain.plot import policy as figures
-from unconstrain.plot.diagnostics import determination
+from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, TRUE
 
 COUNTS = {
     "advice, toy": (trying.TOY_FIRST, 1),
@@ -30,7 +29,7 @@ def toy(seed: int = 0, movements: int = 4) -> Figure:
     figure = Figure(figsize=(10.5, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     levels = np.geomspace(1e-3, 10.0, 17)
-    determination(left, report, (-1.0, -1.0), (1.0, 1.0), levels=levels)
+    plot.standard_deviation(report, (-1.0, -1.0), (1.0, 1.0), levels=levels, ax=left)
     left.set_title("predicted: standard deviation of the policy", fontsize=10.5)
     axis = np.linspace(-1.0, 1.0, 60)
     X = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
@@ -38,7 +37,7 @@ def toy(seed: int = 0, movements: int = 4) -> Figure:
     shown = right.contourf(
         axis, axis, np.clip(error, levels[0], levels[-1]), levels, norm="log", cmap="viridis"
     )
-    figures.trajectories(right, demos.states, demos.episodes, color="white")
+    plot.trajectory(demos.states, episodes=demos.episodes, color="white", ax=right)
     right.set(xlabel="x1", ylabel="x2", aspect="equal", xlim=(-1, 1), ylim=(-1, 1))
     right.set_title("actual: error of the policy", fontsize=10.5)
     figure.colorbar(
@@ -66,7 +65,7 @@ def advice(results: list[dict]) -> Figure:
     """nUPE against the number of demonstrations, advised and random."""
     figure = Figure(figsize=(9.6, 4.0), layout="constrained")
     for ax, (part, (first, step)) in zip(figure.subplots(1, 2), COUNTS.items(), strict=True):
-        for way, color in (("random", figures.DIRECT), ("advised", figures.LEARNT)):
+        for way, color in (("random", DIRECT), ("advised", LEARNT)):
             errors = np.array([result[part][way] for result in results])
             counts = first + step * np.arange(errors.shape[1])
             low, middle, high = np.percentile(errors, [25, 50, 75], axis=0)
@@ -84,13 +83,13 @@ def surfaces(found: list[Surface]) -> Figure:
     figure = Figure(figsize=(12.5, 4.2))
     for i, surface in enumerate(found, 1):
         ax: Any = figure.add_axes((0.35 * i - 0.34, 0.06, 0.31, 0.84), projection="3d")
-        ax.plot(*surface.points.T, ".", color=figures.RECORDED, ms=1.5)
+        ax.plot(*surface.points.T, ".", color=RECORDED, ms=1.5)
         picked = slice(None, None, max(1, len(surface.points) // 30))
         points, length = surface.points[picked], 0.2 * float(np.ptp(surface.points, axis=0).max())
         # A normal has no sign: both are drawn to the same side, the upper one.
         for lines, color, label in (
-            (surface.normals[picked], figures.TRUE, "normal of the points"),
-            (surface.unseen[picked], figures.LEARNT, "direction least seen"),
+            (surface.normals[picked], TRUE, "normal of the points"),
+            (surface.unseen[picked], LEARNT, "direction least seen"),
         ):
             up = lines * np.where(lines[:, 2:] < 0, -1.0, 1.0)
             ax.quiver(*points.T, *(length * up).T, color=color, lw=1, arrow_length_ratio=0.2, label=label)
@@ -101,7 +100,7 @@ def surfaces(found: list[Surface]) -> Figure:
         if i == 1:
             ax.legend(frameon=False, fontsize=8, loc="upper left")
     last = figure.add_axes((0.74, 0.15, 0.24, 0.72))
-    for surface, color in zip(found, (figures.LEARNT, figures.DIRECT), strict=False):
+    for surface, color in zip(found, (LEARNT, DIRECT), strict=False):
         angles = np.sort(surface.angles)
         last.plot(angles, np.arange(1, len(angles) + 1) / len(angles), color=color, label=surface.name)
     last.set(xlabel="angle between them (°)", ylabel="share of states", xlim=(0, 90), ylim=(0, 1))

@@ -20,9 +20,10 @@ from reproduction.plants.barrier import CLEARANCE, Wall, blocking
 from reproduction.plants.humanoid import Humanoid
 from reproduction.robots import OUR_OWN, RobotChoice
 from reproduction.trials import run_trials
+from unconstrain import plot
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.plot import policy as figures
+from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
 from unconstrain.policies import ParametricPolicy
 
 Array = NDArray[np.float64]
@@ -187,7 +188,7 @@ def reproduce(
     )  # fmt: skip
     table = _table(results)
     files = write_results(out, {"settings": settings, "trials": results}, table)
-    figures.save(_figure(results), out / "errors.png")
+    plot.save(_figure(results), out / "errors.png")
     return Outcome(
         title=f"A posture in {n} dimensions, a wall in the hands' way (Sec. IV-D)",
         table=table,
@@ -230,11 +231,11 @@ def _findings(results: list[dict], n: int) -> tuple[str, ...]:
 def _figure(results: list[dict]) -> Figure:
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     ax = figure.subplots()
-    for row, (kind, color) in enumerate(zip(KINDS, (figures.LEARNT, figures.DIRECT), strict=True)):
+    for row, (kind, color) in enumerate(zip(KINDS, (LEARNT, DIRECT), strict=True)):
         values = _values(results, kind, "nUPE")
         ax.plot(values, np.full(len(values), row), "o", color=color, alpha=0.35, ms=6, mec="none")
         mean = published.POSTURE_NUPE[kind][0]
-        ax.plot([mean, mean], [row - 0.3, row + 0.3], "--", color=figures.TRUE, lw=1.2)
+        ax.plot([mean, mean], [row - 0.3, row + 0.3], "--", color=TRUE, lw=1.2)
     ax.set(xscale="log", xlabel="nUPE", yticks=range(len(KINDS)), yticklabels=KINDS, ylim=(-0.6, 1.6))
     ax.grid(axis="x", alpha=0.3)
     return figure

@@ -10,9 +10,9 @@ from rich.console import Console
 from reproduction import published
 from reproduction.outcome import Outcome, write_results
 from reproduction.trials import run_trials
-from unconstrain import demo
+from unconstrain import demo, plot
 from unconstrain.demo import FEW, MOVEMENTS, WIDTH, draw_data, learn, measure_errors
-from unconstrain.plot import policy as figures
+from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 
 TRIALS = 100
 SHARES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -56,7 +56,7 @@ def reproduce(out: Path, *, trials: int | None = None, jobs: int = 1, console: C
     table = _table(results)
     files = write_results(out, {"settings": settings, "trials": results}, table)
     written = {
-        name: [figures.save(figure, out / f"{name}{suffix}") for suffix in (".png", ".svg")]
+        name: [plot.save(figure, out / f"{name}{suffix}") for suffix in (".png", ".svg")]
         for name, figure in (("fig3", figure_3(results)), ("fig4", figure_4(results)))
     }
     captions = {
@@ -135,7 +135,7 @@ def figure_4(results: list[dict]) -> Figure:
         (left, "share", SHARES, "size of the data set (% of 40 trajectories)"),
         (right, "noise", NOISE, "noise on the actions (% of their scale)"),
     ):
-        for error, color, marker in (("nUPE", figures.LEARNT, "o"), ("nCPE", figures.DIRECT, "s")):
+        for error, color, marker in (("nUPE", LEARNT, "o"), ("nCPE", DIRECT, "s")):
             all_values = np.array([_collected(results, f"{name} {value}", error) for value in values])
             percent = 100 * np.array(values)
             low, high = np.percentile(all_values, [10, 90], axis=1)
@@ -145,8 +145,6 @@ def figure_4(results: list[dict]) -> Figure:
         ax.legend(frameon=False)
         ax.grid(alpha=0.3)
     left.set_yscale("log")
-    right.plot(
-        100 * np.array(NOISE), np.square(NOISE), color=figures.RECORDED, ls="--", label="noise variance"
-    )
+    right.plot(100 * np.array(NOISE), np.square(NOISE), color=RECORDED, ls="--", label="noise variance")
     right.legend(frameon=False)
     return figure

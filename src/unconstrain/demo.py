@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from unconstrain import metrics
+from unconstrain import metrics, plot
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features import NormalizedRBF
 from unconstrain.limit_cycle import LimitCycle, demonstrate
-from unconstrain.plot import policy as plots
+from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
 from unconstrain.policies import ParametricPolicy
 
 MOVEMENTS, FEW = 40, 4
@@ -126,23 +126,23 @@ def plot_fields(captions: Mapping[str, str] | None = None) -> Figure:
     training, test = draw_data(0)
     free = demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))
     panels = [
-        ("learnt, {} movements", "inconsistency", FEW, plots.LEARNT),
-        ("learnt, {} movements", "inconsistency", MOVEMENTS, plots.LEARNT),
-        ("ordinary regression", "direct", MOVEMENTS, plots.DIRECT),
+        ("learnt, {} movements", "inconsistency", FEW, LEARNT),
+        ("learnt, {} movements", "inconsistency", MOVEMENTS, LEARNT),
+        ("ordinary regression", "direct", MOVEMENTS, DIRECT),
     ]
     figure = Figure(figsize=(14.0, 4.3), layout="constrained")
     first, *others = figure.subplots(1, 4)
     # The length of the arrows halfway between the cycle and the corners: those at the corners may overlap.
     longest = float(np.linalg.norm(LimitCycle()(np.array([[0.8, 0.8]]))))
-    plots.trajectories(first, free.states, free.episodes)
-    plots.field(first, LimitCycle(), color=plots.TRUE, longest=longest)
+    plot.trajectory(free.states, episodes=free.episodes, ax=first)
+    plot.field(LimitCycle(), color=TRUE, longest=longest, ax=first)
     first.set_title("true policy", fontsize=12)
     first.set_xlabel("x1")
     for ax, (title, way, movements, color) in zip(others, panels, strict=True):
         policy = learn(training, way, movements)
         shown = training.select(training.episodes < movements)
-        plots.trajectories(ax, shown.states, shown.episodes)
-        plots.field(ax, policy, color=color, longest=longest)
+        plot.trajectory(shown.states, episodes=shown.episodes, ax=ax)
+        plot.field(policy, color=color, longest=longest, ax=ax)
         ax.set_title(title.format(movements), fontsize=12)
         if captions is None:
             caption = "   ".join(

@@ -37,6 +37,24 @@ def lengths(U: np.ndarray) -> np.ndarray:
     return largest * np.sqrt(np.einsum("nd,nd->n", shares, shares))
 
 
+def root_mean_square(U: np.ndarray) -> float:
+    """Compute the root mean square length of actions.
+
+    Parameters
+    ----------
+    U : ndarray of shape (N, d)
+        Actions of any magnitude.
+
+    Returns
+    -------
+    float
+        `√(mean ‖u‖²)`, in the unit of the actions.
+    """
+    r = lengths(U)
+    longest = float(r.max(initial=0.0))
+    return longest * float(np.sqrt(np.mean((r / longest) ** 2))) if longest else 0.0
+
+
 def moving(U: np.ndarray, scale: float | None = None) -> np.ndarray:
     """Tell which actions have a direction: those longer than `NO_MOTION` times `scale`.
 

@@ -10,13 +10,12 @@ import pyarrow.csv
 import typer
 from rich.table import Table
 
-from unconstrain import atomic, metrics
+from unconstrain import atomic, metrics, plot
 from unconstrain import demo as experiment
 from unconstrain.cli import reporting
 from unconstrain.cli.reporting import quoted
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
-from unconstrain.plot import policy as figures
 
 ROWS = {
     "inconsistency": "the policy behind them (inconsistency)",
@@ -44,7 +43,7 @@ def demo(
             errors = experiment.measure_errors(policy, test)
             share = metrics.explained(test.actions, policy.predict(test.states))
             rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}", f"{share:.2%}"))
-        picture = figures.save(experiment.plot_fields(), out / "limit-cycle.png")
+        picture = plot.save(experiment.plot_fields(), out / "limit-cycle.png")
         _write_csv(training, out / "movements.csv")
     columns = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explained")
     _write_markdown(columns, rows, out / "table.md")

@@ -5,13 +5,12 @@ from typing import Annotated
 
 import typer
 
+from unconstrain import plot
 from unconstrain.arrays import check_choice
 from unconstrain.cli import models, recordings, reporting
 from unconstrain.diagnostics import identifiability
 from unconstrain.diagnostics.spectrum import THRESHOLD
 from unconstrain.errors import PolicyError
-from unconstrain.plot import policy as figures
-from unconstrain.plot.diagnostics import drawn
 
 CHOICES = tuple(name for name in models.MODELS if name != "auto")
 
@@ -50,7 +49,7 @@ def diagnose(
     `unconstrain diagnose wipe.csv --state x,y,z --time t --episode run --model locally-linear`
     """
     recordings.check_writable(figure)
-    figures.check_suffix(figure)
+    plot.check_suffix(figure)
     check_choice(model, "--model", models.MODELS)
     if model == "auto":
         raise PolicyError(f"diagnose is about one model: choose --model {' or '.join(CHOICES)}")
@@ -70,5 +69,5 @@ def diagnose(
     if report.n_silent:
         console.print(f"{report.n_silent} samples do not move, and say nothing")
     if figure is not None:
-        figures.save(drawn(report, demos.state_names), figure)
+        plot.save(plot.identifiability_figure(report, demos.state_names), figure)
         console.print(f"figure: {figure}")

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from sklearn.base import clone
 
+from unconstrain import plot
 from unconstrain import selection as comparison
 from unconstrain.arrays import check_choice
 from unconstrain.cli import models, recordings, reporting, streams
@@ -18,7 +19,6 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics import identifiability
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.observation import unknown
-from unconstrain.plot import policy as figures
 from unconstrain.policies.base import Policy
 
 WORTH_A_WARNING = 0.1
@@ -65,7 +65,7 @@ def fit(
     `unconstrain fit wipe.csv --state x,y,z --time t --episode run --out wipe.skops`
     """
     recordings.check_writable(out, figure)
-    figures.check_suffix(figure)
+    plot.check_suffix(figure)
     check_choice(model, "--model", models.MODELS)
     check_choice(risk, "--risk", ("inconsistency", "direct"))
     if folds is not None:
@@ -121,7 +121,7 @@ def fit(
             soft_wrap=True,
         )
     if figure is not None:
-        figures.save(figures.learned_field(demos, policy), figure)
+        plot.save(plot.policy_figure(policy, demos), figure)
         console.print(f"figure: {figure}")
     policy.save(out)
     _point_on(console, out)

@@ -7,14 +7,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import typer
-from matplotlib.figure import Figure
 
-from unconstrain import atomic
+from unconstrain import atomic, plot
 from unconstrain.cli import recordings, reporting
-from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.fitting.posterior import Unsure
-from unconstrain.plot import policy as figures
 from unconstrain.policies import load_policy
 from unconstrain.simulation import rollout as integrate
 
@@ -48,7 +45,7 @@ def rollout(
 ) -> None:
     """Integrate a saved policy from a start, free or under a constraint."""
     recordings.check_writable(out, figure)
-    figures.check_suffix(figure)
+    plot.check_suffix(figure)
     learnt = load_policy(policy)
     rows = np.array([_numbers(row, "--block", learnt.n_actions_) for row in block]) if block else None
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
@@ -67,7 +64,7 @@ def rollout(
     columns |= {f"{name}_velocity": movement.actions[:, i] for i, name in enumerate(names)}
     with atomic.replacing(out) as temporary:
         pyarrow.csv.write_csv(pa.table(columns), temporary)
-    figures.save(_drawn(movement, names), figure)
+    plot.save(plot.rollout_figure(movement, names), figure)
     console = reporting.console()
     end = ", ".join(f"{name} {value:.4g}" for name, value in zip(names, movement.states[-1], strict=True))
     console.print(f"after {taken * dt:g} s: {end}")
@@ -102,21 +99,3 @@ def _names(policy) -> list[str]:
     if named and len(distinct) == 2 * len(known) + 1:
         return list(known)
     return [f"x{i + 1}" for i in range(policy.n_features_in_)]
-
-
-def _drawn(movement: Demonstrations, names: list[str]) -> Figure:
-    """The path over the first two states, and every state against time."""
-    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    if len(names) > 1:
-        figures.trajectories(left, movement.states, movement.episodes, color=figures.LEARNT, style="-")
-        left.set(xlabel=names[0], ylabel=names[1])
-        left.set_aspect("equal", adjustable="datalim")
-    else:
-        left.plot(movement.states[:, 0], movement.actions[:, 0], color=figures.LEARNT)
-        left.set(xlabel=names[0], ylabel=f"{names[0]} velocity")
-    for i, name in enumerate(names):
-        right.plot(movement.time, movement.states[:, i], label=name)
-    right.set(xlabel="t (s)")
-    right.legend(frameon=False, fontsize=8, ncols=2)
-    return figure

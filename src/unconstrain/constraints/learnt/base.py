@@ -3,84 +3,199 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain import metrics as risk
+from unconstrain import metrics
 from unconstrain.arrays import check_actions, check_groups, check_samples, check_states
+from unconstrain.constraints.learnt.lines import equation, mean_line
 from unconstrain.errors import DataError, PolicyError, PolicyFileError
 from unconstrain.fitting.solve import splits
 from unconstrain.policies import persistence
 
 
 class LearntConstraint(BaseEstimator, ABC):
-    """Base of the estimators of constraints. A subclass says what its orthonormal rows are at given states."""
+    """Base of the estimators of constraints: a subclass fits, and says what its orthonormal rows are at given states.
+
+    Attributes
+    ----------
+    n_constraints_ : int
+        Number k of rows.
+    n_actions_ : int
+        Dimension d of the actions.
+    shares_ : ndarray
+        Shares of motion along each row, and along the other directions where they were looked at, ascending.
+    reason_ : str
+        Why so many rows.
+    """
 
     n_constraints_: int
     n_actions_: int
     shares_: np.ndarray
     reason_: str
 
-    def rows(self, X) -> np.ndarray:
-        """Constraint rows A(x) at states X (N, n), orthonormal at each: (N, k, d), with ``A u ≈ 0``.
+    @abstractmethod
+    def fit(self, X: ArrayLike, U: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
+        """Learn from actions that were all under one constraint.
 
-        A row is zero where the constraint vanishes or its direction is not determined.
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions, d > 1.
+        groups : array_like of shape (N,), optional
+            Episodes.
+
+        Returns
+        -------
+        LearntConstraint
+            Itself, fitted.
+        """
+
+    @abstractmethod
+    def evaluate_rows(self, X: np.ndarray) -> np.ndarray:
+        """Compute the rows at states that were checked already; `rows` is what users call.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, k, d)
+            Orthonormal rows.
+        """
+
+    def rows(self, X: ArrayLike) -> np.ndarray:
+        """Compute the constraint rows at states.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, k, d)
+            ``A(x)`` with ``A u ≈ 0``, orthonormal at each state. A row is zero where the constraint vanishes or its
+            direction is not determined.
         """
         check_is_fitted(self)
-        return self._rows(check_states(self, X))
+        return self.evaluate_rows(check_states(self, X))
 
-    def predict(self, X) -> np.ndarray:
-        """Nullspace projections ``N = I - AᵀA`` at states X (N, n): (N, d, d), to be given to ``policy.fit``."""
+    def predict(self, X: ArrayLike) -> np.ndarray:
+        """Compute the nullspace projections at states, to be given to ``policy.fit(..., projections=)``.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, d, d)
+            ``N = I - AᵀA``.
+        """
         A = self.rows(X)
         return np.eye(self.n_actions_) - A.swapaxes(1, 2) @ A
 
-    def score(self, X, U) -> float:
-        """Share of the motion that the constraint lets through, ``1 - Σ ‖u - N u‖² / Σ ‖u‖²``, at most 1.
+    def score(self, X: ArrayLike, U: ArrayLike) -> float:
+        """Compute the share of the motion that the constraint lets through.
 
         Of constraints with the same number of rows the higher is the better; with more rows it can only fall.
-        Raises `DataError` where nothing moves.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions, of any magnitude.
+
+        Returns
+        -------
+        float
+            ``1 - Σ ‖u - N u‖² / Σ ‖u‖²``, at most 1.
+
+        Raises
+        ------
+        DataError
+            If nothing moves.
         """
-        actions = check_actions(U)
-        motion = float(np.mean(np.sum(actions**2, axis=1)))
-        if motion == 0.0:
+        U = check_actions(U)
+        largest = np.abs(U).max(initial=0.0)
+        if largest == 0.0:
             raise DataError("all actions are zero: there is no motion to compare a constraint with")
-        return 1.0 - risk.projected_observation_error(actions, self.predict(X)) / motion
+        U = U / largest
+        motion = float(np.mean(np.sum(U**2, axis=1)))
+        return 1.0 - metrics.projected_observation_error(U, self.predict(X)) / motion
+
+    def describe(self, X: ArrayLike, action_names: Sequence[str]) -> str:
+        """State the rows as equations between the actions, and why there are so many.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States, over which rows that vary are averaged.
+        action_names : sequence of str
+            Names of the d actions.
+
+        Returns
+        -------
+        str
+            Several lines.
+        """
+        lines = [f"rows: {self.n_constraints_} ({self.reason_})"]
+        A = self.rows(X)
+        for j in range(A.shape[1]):
+            mean = mean_line(A[:, j])
+            turned = np.degrees(np.arccos(np.clip(np.abs(A[:, j] @ mean), 0.0, 1.0)))
+            lines.append(
+                f"  {equation(mean, action_names)}   on average; it turns by {np.median(turned):.0f}° (median)"
+            )
+        return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write the constraint to `path` (customarily `.skops`), to be read by `load_constraint`. Holds no pickle.
+        """Write the constraint to a file, to be read by `load_constraint`.
 
         A task Jacobian of your own is saved by the name of its function, and has to be importable where it is read.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write it, customarily `.skops`.
         """
         check_is_fitted(self)
         persistence.save(self, path)
 
-    @abstractmethod
-    def _rows(self, X: np.ndarray) -> np.ndarray:
-        """Orthonormal rows (N, k, d) at checked states."""
-
-    def _checked(self, X, U, groups) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    def _check_samples(
+        self, X: ArrayLike, U: ArrayLike, groups: ArrayLike | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         X, U = check_samples(self, X, U, reset=True)
-        actions = check_actions(U)
-        d = actions.shape[1]
+        U = check_actions(U)
+        d = U.shape[1]
         if d < 2:
             raise DataError(
                 "a constraint needs two or more actions: with one, it would leave no motion at all"
             )
-        if len(actions) < d:
+        if len(U) < d:
             raise DataError(
-                f"{len(actions)} samples are fewer than the {d} actions: which directions never move cannot be told; "
+                f"{len(U)} samples are fewer than the {d} actions: which directions never move cannot be told; "
                 "give more samples"
             )
-        if not actions.any():
+        if not U.any():
             raise DataError(
                 "all actions are zero: which directions never move cannot be told; give samples that move"
             )
         self.n_actions_ = d
-        return X, actions, check_groups(groups, len(X))
+        return X, U, check_groups(groups, len(X))
 
-    def _asked(self, n_constraints) -> int | None:
+    def _check_number_of_rows(self, n_constraints: int | None) -> int | None:
         if n_constraints is None:
             return None
         whole = isinstance(n_constraints, int | np.integer) and not isinstance(n_constraints, bool)
@@ -92,10 +207,26 @@ class LearntConstraint(BaseEstimator, ABC):
         return int(n_constraints)
 
 
-def held_out_projections(constraint: LearntConstraint, X: np.ndarray, U: np.ndarray, groups) -> np.ndarray:
-    """Projections (N, d, d) at every sample by copies of `constraint` fitted to the folds it is not in.
+def held_out_projections(
+    constraint: LearntConstraint, X: np.ndarray, U: np.ndarray, groups: np.ndarray
+) -> np.ndarray:
+    """Predict projections at every sample by copies of a constraint fitted to the folds it is not in.
 
-    X (N, n), U (N, d), groups (N,): episodes or blocks, held out whole.
+    Parameters
+    ----------
+    constraint : LearntConstraint
+        Is cloned, never changed.
+    X : ndarray of shape (N, n)
+        States.
+    U : ndarray of shape (N, d)
+        Actions.
+    groups : ndarray of shape (N,)
+        Episodes or blocks, held out whole.
+
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        Nullspace projections.
     """
     N = np.empty((*U.shape, U.shape[1]))
     for train, test in splits(len(X), groups):
@@ -104,9 +235,24 @@ def held_out_projections(constraint: LearntConstraint, X: np.ndarray, U: np.ndar
 
 
 def load_constraint(path: str | Path, *, trusted: Sequence[str] = ()) -> LearntConstraint:
-    """The constraint that `constraint.save(path)` wrote; all else as for `load_policy`.
+    """Read the constraint that ``constraint.save(path)`` wrote.
 
-    Raises `PolicyFileError` for any other file.
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    trusted : sequence of str
+        As for `load_policy`.
+
+    Returns
+    -------
+    ConstantConstraint or FeatureConstraint
+        The constraint, fitted.
+
+    Raises
+    ------
+    PolicyFileError
+        If the file is missing, damaged, of a newer release, or not a constraint.
     """
     loaded = persistence.load_policy(path, trusted=trusted)
     if not isinstance(loaded, LearntConstraint):

@@ -1,43 +1,91 @@
 """Component, constraint, policy: from actions alone to a policy learnt with the constraints found in them."""
 
+from typing import Any, Self
+
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_actions, check_groups, check_samples
+from unconstrain.constraints.learnt.base import LearntConstraint
+from unconstrain.constraints.learnt.component import NullspaceComponent
 from unconstrain.errors import DataError
 
 
 class ConstraintChain(RegressorMixin, BaseEstimator):
-    """Learns the constraints, then the policy with their projections:
+    """Constraints learnt from the actions, and then the policy with their projections.
+
+    Parameters
+    ----------
+    constraint : ConstantConstraint or FeatureConstraint
+        Finds the constraint.
+    policy : policy
+        Learns with the projections found.
+    component : NullspaceComponent, optional
+        Separates a task part that varies first.
+
+    Attributes
+    ----------
+    policy_ : policy
+        As fitted.
+    constraints_, components_ : dict
+        By condition, as fitted.
+    projections_ : ndarray of shape (N, d, d)
+        Of the samples.
+
+    Notes
+    -----
+    The parts learn in this order:
 
         ũ(x) = N(x) π(x)  from  u      (`component`, where a task part varies; else ũ = u)
         N(x)              from  ũ      (`constraint`)
-        π(x)              from  N u, N (`policy`, risk "auto")
+        π(x)              from  N u, N (`policy`)
 
-    Recordings under different constraints are told apart by `conditions` in `fit`: each has a constraint of its own,
-    and the policy is learnt from all of them.
-
-    constraint: a `ConstantConstraint` or `FeatureConstraint`. policy: a policy. component: a `NullspaceComponent`, or
-        None. All are cloned, never changed.
-
-    After `fit`: `policy_`; `constraints_` and `components_`, by condition; `projections_` (N, d, d), of the samples.
+    All of them are cloned, never changed.
     """
 
-    def __init__(self, constraint, policy, component=None):
+    def __init__(
+        self, constraint: LearntConstraint, policy: Any, component: NullspaceComponent | None = None
+    ):
         self.constraint = constraint
         self.policy = policy
         self.component = component
 
-    def fit(self, X, U, *, groups=None, conditions=None):
-        """Learn from states X (N, n) and actions U (N, d).
+    def fit(
+        self,
+        X: ArrayLike,
+        U: ArrayLike,
+        *,
+        groups: ArrayLike | None = None,
+        conditions: ArrayLike | None = None,
+    ) -> Self:
+        """Learn from recordings under one constraint, or under one for each condition.
 
-        groups: episodes (N,). conditions: labels (N,) of samples under the same constraint; all are, by default.
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions.
+        groups : array_like of shape (N,), optional
+            Episodes.
+        conditions : array_like of shape (N,), optional
+            Samples of one label are under one constraint, and one policy is learnt from all. By default all samples
+            are under the same constraint.
 
-        Raises what its parts raise.
+        Returns
+        -------
+        ConstraintChain
+            Itself, fitted.
+
+        Raises
+        ------
+        DataError
+            If there is not one condition a sample, and for what its parts refuse.
         """
-        X, y = check_samples(self, X, U, reset=True, min_samples=2)
-        U, groups = check_actions(y), check_groups(groups, len(X))
+        X, U = check_samples(self, X, U, reset=True, min_samples=2)
+        U, groups = check_actions(U), check_groups(groups, len(X))
         labels = np.zeros(len(X), dtype=int) if conditions is None else np.asarray(conditions)
         if labels.shape != (len(X),):
             raise DataError(
@@ -60,12 +108,36 @@ class ConstraintChain(RegressorMixin, BaseEstimator):
         self.policy_ = clone(self.policy).fit(X, left, groups=groups, projections=self.projections_)
         return self
 
-    def predict(self, X) -> np.ndarray:
-        """Actions of the unconstrained policy, (N, d), at states X (N, n)."""
+    def predict(self, X: ArrayLike) -> np.ndarray:
+        """Compute actions of the unconstrained policy at states.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            Actions.
+        """
         check_is_fitted(self)
         return self.policy_.predict(X)
 
-    def score(self, X, U) -> float:
-        """Share of observed motion explained by the policy; see `ParametricPolicy.score`."""
+    def score(self, X: ArrayLike, U: ArrayLike) -> float:
+        """Compute the share of observed motion that the policy explains; see `metrics.explained`.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions.
+
+        Returns
+        -------
+        float
+            At most 1.
+        """
         check_is_fitted(self)
         return self.policy_.score(X, U)

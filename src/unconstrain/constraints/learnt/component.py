@@ -1,18 +1,42 @@
 """The part of the actions that stays the same while a task varies."""
 
+from typing import Self
+
 import numpy as np
-from scipy.optimize import least_squares
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_actions, check_number, check_samples, check_states
 from unconstrain.errors import DataError
+from unconstrain.features.base import PolicyFeatures
 from unconstrain.features.full import as_policy_features
+from unconstrain.motion import root_mean_square
 
 
 class NullspaceComponent(BaseEstimator):
-    """``ũ(x) ≈ N(x) π(x)`` from actions ``u = A⁺(x) b + N(x) π(x)`` whose task part ``A⁺b`` varies between recordings.
+    """The part ``ũ(x) ≈ N(x) π(x)`` of actions ``u = A⁺(x) b + N(x) π(x)`` whose task part ``A⁺b`` varies.
 
+    Parameters
+    ----------
+    features : transformer or policy features, optional
+        Of ũ, as for `ParametricPolicy`; ``(x, 1)`` by default.
+    alpha : float
+        Weight decay λ of ``E(w) + λ‖w‖²``.
+
+    Attributes
+    ----------
+    weights_ : ndarray of shape (P,)
+        Parameters of ũ.
+    features_ : policy features
+        As fitted.
+    cost_ : float
+        Mean of E over the samples, in squared units of the action.
+    n_evaluations_ : int
+        Evaluations of E that the minimisation took.
+
+    Notes
+    -----
     The two parts are at right angles, so the projection of u on the direction of the nullspace component is that
     component, whatever the task did. With ``P_n`` the projection on ``ũ(x_n)``,
 
@@ -21,25 +45,47 @@ class NullspaceComponent(BaseEstimator):
     minimised by nonlinear least squares (SciPy), started from direct regression, which is right where the task part
     averages out. Where it does not vary it cannot be told apart, and the minimum is not unique.
 
-    features: of ũ, as for `ParametricPolicy`: a transformer, policy features, or None for ``(x, 1)``.
-    alpha: weight decay λ of ``E(w) + λ‖w‖²``.
-
-    After `fit`: `weights_` (P,), `features_`, `cost_` (mean E per sample), `n_evaluations_`.
-
-    Source: Towell, Howard, Vijayakumar, "Learning nullspace policies", IROS 2010.
+    References
+    ----------
+    Towell, Howard, Vijayakumar, "Learning nullspace policies", IROS 2010.
     """
 
-    def __init__(self, features=None, alpha=1e-6):
+    n_actions_: int
+    features_: PolicyFeatures
+    weights_: np.ndarray
+
+    def __init__(self, features: object = None, alpha: float = 1e-6):
         self.features = features
         self.alpha = alpha
 
-    def fit(self, X, U, *, groups=None):
-        """Learn from states X (N, n) and actions U (N, d), d > 1. `groups` changes nothing.
+    def fit(self, X: ArrayLike, U: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
+        """Learn from recordings in which the task part varies.
 
-        Raises `DataError` for bad arrays, one action dimension, or no motion; `PolicyError` for bad options.
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions, d > 1.
+        groups : array_like of shape (N,), optional
+            Episodes; they change nothing.
+
+        Returns
+        -------
+        NullspaceComponent
+            Itself, fitted.
+
+        Raises
+        ------
+        DataError
+            For bad arrays, one action dimension, or no motion.
+        PolicyError
+            For bad options.
         """
-        X, y = check_samples(self, X, U, reset=True, min_samples=2)
-        U = check_actions(y)
+        from scipy.optimize import least_squares  # slow to import
+
+        X, U = check_samples(self, X, U, reset=True, min_samples=2)
+        U = check_actions(U)
         alpha = check_number(self.alpha, "alpha", positive=False)
         if U.shape[1] < 2:
             raise DataError("a task and a nullspace component need two or more actions between them, got 1")
@@ -47,7 +93,7 @@ class NullspaceComponent(BaseEstimator):
             raise DataError("all actions are zero: there is nothing to separate")
         self.features_ = as_policy_features(self.features).fit(X, U.shape[1])
         self.n_actions_ = U.shape[1]
-        scale = np.sqrt(np.mean(np.sum(U**2, axis=1)))
+        scale = root_mean_square(U)
         V = U / scale
         root = np.sqrt(alpha)
         # Component by component, stacked: (d, N, P).
@@ -80,17 +126,47 @@ class NullspaceComponent(BaseEstimator):
         self.n_evaluations_ = int(found.nfev)
         return self
 
-    def predict(self, X) -> np.ndarray:
-        """The component ``ũ(x)``, (N, d), at states X (N, n)."""
+    def predict(self, X: ArrayLike) -> np.ndarray:
+        """Compute the component at states.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            ``ũ(x)``.
+        """
         check_is_fitted(self)
         return self.features_.evaluate(check_states(self, X), self.weights_)
 
-    def score(self, X, U) -> float:
-        """``1 - E(ũ) / Σ ‖u‖²``, at most 1, for states X (N, n) and actions U (N, d)."""
+    def score(self, X: ArrayLike, U: ArrayLike) -> float:
+        """Compute how well the component and a varying task part explain the motion.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions.
+
+        Returns
+        -------
+        float
+            ``1 - E(ũ) / Σ ‖u‖²``, at most 1.
+
+        Raises
+        ------
+        DataError
+            If nothing moves.
+        """
         U, P = check_actions(U), self.predict(X)
-        motion = float(np.sum(U**2))
-        if motion == 0.0:
+        scale = root_mean_square(U)
+        if scale == 0.0:
             raise DataError("all actions are zero: there is nothing to explain")
+        U, P = U / scale, P / scale
         length = np.linalg.norm(P, axis=1)
-        seen = np.divide(np.einsum("nd,nd->n", P, U), length, out=np.zeros_like(length), where=length > 0)
-        return 1.0 - float(np.sum((seen - length) ** 2)) / motion
+        along = np.divide(np.einsum("nd,nd->n", P, U), length, out=np.zeros_like(length), where=length > 0)
+        return 1.0 - float(np.mean((along - length) ** 2))

@@ -1,7 +1,7 @@
 """Constraints that depend on the state: rows linear in features, found as generalised eigenvectors.
 
-A row ``r(x) = Φ(x)ᵀ λ`` is a "policy" that is never seen along any action: what policies are made of
-(`features.base`) serves here as well, and ``r(x)·u = v(x, u)·λ``. The share of motion along the row,
+A row ``r(x) = Φ(x)ᵀ λ`` is a policy that never moves along any action: the features
+of policies (`features.base`) serve here as well, and ``r(x)·u = v(x, u)·λ``. The share of motion along the row,
 
     μ(λ) = Σ_n (r(x_n)·u_n)² / Σ_n ‖r(x_n)‖² ‖u_n‖²  =  λᵀH λ / λᵀG λ,
 
@@ -19,15 +19,19 @@ there. So r minimises
 the share of motion along the unit row on held-out episodes.
 """
 
+from typing import Self
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from unconstrain.arrays import check_number
 from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.constraints.learnt.jacobian import JacobianFeatures
-from unconstrain.constraints.learnt.spectrum import count, listed
-from unconstrain.features.base import is_policy_features
+from unconstrain.constraints.learnt.spectrum import count_constrained, format_shares
+from unconstrain.features.base import PolicyFeatures
 from unconstrain.features.full import as_policy_features
 from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.motion import root_mean_square
 
 RHOS = np.array([1e-10, 1e-8, 1e-7, 1e-6, 1e-4, 1e-2, 1e-1])
 RESOLUTION = 1e-10
@@ -35,52 +39,101 @@ RESOLUTION = 1e-10
 DAMPED = 1e-3
 """Eigenvectors that ρ would damp below this are left out."""
 NUMBERS = 40_000_000
-"""Samples times actions times features looked at, at most; of more samples every second, third, ... is taken."""
+"""Samples times actions times features used, at most; of more samples every second, third, ... is taken."""
 TURNS, SETTLED = 20, 1e-4
 SAMPLES_TO_EVEN = 2000
 """A row's length is evened out in so many turns and on so many samples at most: it is a choice among equals."""
 
 
 class FeatureConstraint(LearntConstraint):
-    """``A(x) u = 0`` with rows ``A(x) = Λ Φ(x)`` linear in features of the state.
+    """A constraint ``A(x) u = 0`` whose rows ``A(x) = Λ Φ(x)`` are linear in features of the state.
 
-    features: what the rows are combined from. A function that returns a task Jacobian J (N, m, d) at states X (N, n):
-        then Λ (k, m) says which task coordinates are constrained. A scikit-learn transformer b, or None for
+    Parameters
+    ----------
+    features : callable, transformer or policy features, optional
+        What the rows are combined from. A function that returns a task Jacobian J (N, m, d) at states X (N, n): then
+        Λ (k, m) says which task coordinates are constrained. A scikit-learn transformer b, by default
         ``b(x) = (x, 1)``: then ``Φ(x) = b(x) ⊗ I``, any direction that varies as b does. Or policy features:
         `PotentialFeatures(PolynomialFeatures(2))`, say, makes the row a gradient: the constraint is a quadric surface.
-    n_constraints: k; None reads it off how the motion is shared out, as `ConstantConstraint` does, which needs actions
+    n_constraints : int, optional
+        Number k of rows. None reads it off the shares of motion, as `ConstantConstraint` does, which needs actions
         that differ at like states: features flexible enough make any one movement look constrained but along itself.
-    alpha: ρ, the weight on rows of even length (see the module); "cv" chooses it by held-out episodes.
+    alpha : float or "cv"
+        ρ, the weight on rows of even length (see Notes); "cv" chooses it by held-out episodes.
 
-    After `fit`: `weights_` (k, P), the rows' parameters; `features_`; `n_constraints_`; `shares_`, the share of motion
-    along each row, on held-out episodes, and, with n_constraints=None, along all d directions; `alphas_` (k,);
-    `reason_`, why so many rows.
+    Attributes
+    ----------
+    weights_ : ndarray of shape (k, P)
+        The rows' parameters.
+    features_ : policy features
+        As fitted.
+    n_constraints_ : int
+        Number k of rows.
+    shares_ : ndarray
+        Share of motion along each row, on held-out episodes, and, with ``n_constraints=None``, along the rest.
+    alphas_ : ndarray of shape (k,)
+        ρ of each row.
+    reason_ : str
+        Why so many rows.
 
-    Source of the problem: Lin, Howard, Vijayakumar, ICRA 2015, and Armesto, Bosga, Ivan, Vijayakumar, ICRA 2017, who
-    search angles by nonlinear least squares and take eigenvectors, respectively.
+    Notes
+    -----
+    A row is the smallest generalised eigenvector of two moments; the module says how, and how ρ chooses among the
+    rows that fit alike.
+
+    References
+    ----------
+    The problem is that of Lin, Howard, Vijayakumar, ICRA 2015, who search angles by nonlinear least squares, and of
+    Armesto, Bosga, Ivan, Vijayakumar, ICRA 2017, who take eigenvectors.
     """
 
-    def __init__(self, features=None, n_constraints=1, alpha="cv"):
+    weights_: np.ndarray
+    features_: PolicyFeatures
+    alphas_: np.ndarray
+
+    def __init__(
+        self,
+        features: object = None,
+        n_constraints: int | None = 1,
+        alpha: float | str = "cv",
+    ):
         self.features = features
         self.n_constraints = n_constraints
         self.alpha = alpha
 
-    def fit(self, X, U, *, groups=None):
-        """Learn from states X (N, n) and actions U (N, d), d > 1, all under one constraint.
+    def fit(self, X: ArrayLike, U: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
+        """Learn from actions that were all under one constraint.
 
-        groups: episodes (N,), held out whole; without them contiguous blocks.
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        U : array_like of shape (N, d)
+            Actions, d > 1.
+        groups : array_like of shape (N,), optional
+            Episodes, held out whole; without them contiguous blocks are.
 
-        Raises `DataError` where the actions span everything, are all zero, or are fewer than d;
-        `PolicyError` for bad options.
+        Returns
+        -------
+        FeatureConstraint
+            Itself, fitted.
+
+        Raises
+        ------
+        DataError
+            If the actions span everything, are all zero, or are fewer than d.
+        PolicyError
+            For bad options.
         """
-        X, U, groups = self._checked(X, U, groups)
-        asked = self._asked(self.n_constraints)
+        X, U, groups = self._check_samples(X, U, groups)
+        asked = self._check_number_of_rows(self.n_constraints)
         rhos = RHOS if self.alpha == "cv" else np.array([check_number(self.alpha, "alpha", positive=True)])
-        self.features_ = _features(self.features).fit(X, self.n_actions_, np.sum(U**2, axis=1))
+        U = U / root_mean_square(U)
+        weights = np.sum(U**2, axis=1)
+        self.features_ = _as_row_features(self.features).fit(X, self.n_actions_, weights)
         fold = EpisodeFolds().assign(groups, len(X))
         step = -(-len(X) * self.n_actions_ * self.features_.n_parameters_ // NUMBERS)
-        X, U, fold = X[::step], U[::step] / np.sqrt(np.mean(np.sum(U**2, axis=1))), fold[::step]
-        weights = np.sum(U**2, axis=1)
+        X, U, fold, weights = X[::step], U[::step], fold[::step], weights[::step]
         phi = np.stack(
             [self.features_.along(X, np.broadcast_to(e, U.shape)) for e in np.eye(self.n_actions_)], axis=1
         )
@@ -88,19 +141,17 @@ class FeatureConstraint(LearntConstraint):
         before = np.zeros((len(X), 0, self.n_actions_))
         for _ in range(asked or self.n_actions_ - 1):
             problem = _Problem(phi, U, weights, fold, before)
-            rho, share = problem.chosen(rhos)
-            found.append(problem.row(rho))
+            rho, share = problem.choose(rhos)
+            found.append(problem.solve(rho))
             shares.append(share)
             chosen.append(rho)
-            before = np.concatenate([before, _unit(phi @ found[-1], before)[:, None]], axis=1)
+            before = np.concatenate([before, _orthonormal(phi @ found[-1], before)[:, None]], axis=1)
         if asked is None:
-            shares.append(float(np.sum(_across(U, before) ** 2) / np.sum(U**2)))
-            self.n_constraints_, self.reason_ = count(np.array(shares))
+            shares.append(float(np.sum(_remove(U, before) ** 2) / np.sum(U**2)))
+            self.n_constraints_, self.reason_ = count_constrained(np.array(shares))
         else:
-            self.n_constraints_, self.reason_ = (
-                asked,
-                f"as asked; shares of motion {listed(np.array(shares))}",
-            )
+            self.n_constraints_ = asked
+            self.reason_ = f"as asked; shares of motion {format_shares(np.array(shares))}"
         self.weights_ = np.array(found[: self.n_constraints_])
         self.shares_, self.alphas_ = np.array(shares), np.array(chosen[: self.n_constraints_])
         return self
@@ -114,15 +165,27 @@ class FeatureConstraint(LearntConstraint):
         Q, _ = np.linalg.qr(self.weights_.T)
         return np.sum(Q**2, axis=1)
 
-    def _rows(self, X: np.ndarray) -> np.ndarray:
+    def evaluate_rows(self, X: np.ndarray) -> np.ndarray:
+        """Combine the features to rows, each at right angles to those before.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, k, d)
+            Orthonormal rows.
+        """
         rows = np.zeros((len(X), 0, self.n_actions_))
         for w in self.weights_:
-            rows = np.concatenate([rows, _unit(self.features_.evaluate(X, w), rows)[:, None]], axis=1)
+            rows = np.concatenate([rows, _orthonormal(self.features_.evaluate(X, w), rows)[:, None]], axis=1)
         return rows
 
 
 class _Problem:
-    """One row: its moments by fold, and what they say.
+    """One row: its moments by fold, and the parameters they give.
 
     phi (N, d, P): features along each action; before (N, j, d): rows found so far, unit and at right angles.
     """
@@ -133,19 +196,19 @@ class _Problem:
         self.phi, self.U, self.weights, self.fold, self.before = phi, U, weights, fold, before
         self.folds = np.unique(fold)
         free = phi - before.swapaxes(1, 2) @ (before @ phi)
-        seen = (U[:, None] @ free)[:, 0]
+        along = (U[:, None] @ free)[:, 0]
         spread = free * np.sqrt(weights)[:, None, None]
-        parts = [(seen[fold == k], spread[fold == k].reshape(-1, phi.shape[2])) for k in self.folds]
+        parts = [(along[fold == k], spread[fold == k].reshape(-1, phi.shape[2])) for k in self.folds]
         self.H = np.stack([V.T @ V for V, _ in parts])
         self.G = np.stack([R.T @ R for _, R in parts])
 
-    def row(self, rho: float) -> np.ndarray:
-        """The row's parameters λ (P,) from all samples."""
+    def solve(self, rho: float) -> np.ndarray:
+        """Find the row's parameters λ (P,) from all samples."""
         everything = np.ones(len(self.U), dtype=bool)
-        return self._solve([rho], self.H.sum(axis=0), self.G.sum(axis=0), everything)[:, 0]
+        return self._solve(np.array([rho]), self.H.sum(axis=0), self.G.sum(axis=0), everything)[:, 0]
 
-    def chosen(self, rhos: np.ndarray) -> tuple[float, float]:
-        """ρ with the least share of motion along the unit row on held-out folds, and that share."""
+    def choose(self, rhos: np.ndarray) -> tuple[float, float]:
+        """Choose the ρ with the least share of motion along the unit row on held-out folds; and that share."""
         along = np.zeros(len(rhos))
         for i, k in enumerate(self.folds):
             out = self.fold == k
@@ -157,15 +220,15 @@ class _Problem:
                     ~out,
                 )
             for j, w in enumerate(self._solve(rhos, H, G, train).T):
-                unit = _unit(self.phi[out] @ w, self.before[out])
+                unit = _orthonormal(self.phi[out] @ w, self.before[out])
                 along[j] += np.sum(np.einsum("nd,nd->n", unit, self.U[out]) ** 2)
         # Of shares alike to a part in a thousand (or rounding), the row of most even length.
         shares = along / np.sum(self.weights)
         best = int(np.flatnonzero(shares <= 1.001 * shares.min() + 1e-25)[-1])
         return float(rhos[best]), float(shares[best])
 
-    def _solve(self, rhos, H: np.ndarray, G: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """λ for each ρ, (P, R), from moments H and G (P, P) of the samples `own` (N,)."""
+    def _solve(self, rhos: np.ndarray, H: np.ndarray, G: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Find λ for each ρ, (P, R), from moments H and G (P, P) of the samples `own` (N,)."""
         lengths, E = np.linalg.eigh(G)
         keep = lengths > RESOLUTION * lengths[-1]
         W = E[:, keep] / np.sqrt(lengths[keep])
@@ -189,7 +252,7 @@ class _Problem:
 
 
 def _even(rows: np.ndarray, damping: np.ndarray, weights: np.ndarray, U: np.ndarray) -> np.ndarray:
-    """Coefficients (J,) of the combination of rows (J, N, d) of the most even length, damped (J,)."""
+    """Find the coefficients (J,) of the combination of rows (J, N, d) of the most even length, damped (J,)."""
     if len(rows) == 1:
         return np.ones(1)
     flat = rows.reshape(len(rows), -1)
@@ -201,7 +264,7 @@ def _even(rows: np.ndarray, damping: np.ndarray, weights: np.ndarray, U: np.ndar
     best, least = first, np.inf
     for c in (first, weighted @ np.tile(constant, rows.shape[1])):
         for _ in range(TURNS):
-            t = _normalised((c @ flat).reshape(rows.shape[1:]))
+            t = _normalize((c @ flat).reshape(rows.shape[1:]))
             new = weighted @ t.ravel()
             done = np.linalg.norm(new - c) <= SETTLED * np.linalg.norm(new)
             c = new
@@ -217,23 +280,26 @@ def _even(rows: np.ndarray, damping: np.ndarray, weights: np.ndarray, U: np.ndar
     return best
 
 
-def _unit(raw: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Rows (N, d) made unit and at right angles to rows `before` (N, j, d); zero where nothing is left of them."""
-    row = _across(_across(raw, before), before)  # twice is enough for rounding
+def _orthonormal(raw: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Make rows (N, d) unit and at right angles to rows `before` (N, j, d); zero where nothing is left of them."""
+    row = _remove(_remove(raw, before), before)  # twice is enough for rounding
     length = np.linalg.norm(row, axis=1, keepdims=True)
     whole = np.linalg.norm(raw, axis=1, keepdims=True)
     return np.divide(row, length, out=np.zeros_like(row), where=length > 1e-12 * np.maximum(whole, 1e-300))
 
 
-def _across(rows: np.ndarray, before: np.ndarray) -> np.ndarray:
+def _remove(rows: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Remove what of rows (N, d) lies along unit rows `before` (N, j, d)."""
     return rows - np.einsum("nkd,nk->nd", before, np.einsum("nkd,nd->nk", before, rows))
 
 
-def _normalised(rows: np.ndarray) -> np.ndarray:
+def _normalize(rows: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     return np.divide(rows, length, out=np.zeros_like(rows), where=length > 0)
 
 
-def _features(given):
-    a_jacobian = callable(given) and not is_policy_features(given) and not hasattr(given, "transform")
-    return JacobianFeatures(given) if a_jacobian else as_policy_features(given)
+def _as_row_features(given: object) -> PolicyFeatures:
+    """Make features of rows: a function is a Jacobian; anything that can be fitted is as for a policy."""
+    if callable(given) and not hasattr(given, "fit"):
+        return JacobianFeatures(given)
+    return as_policy_features(given)

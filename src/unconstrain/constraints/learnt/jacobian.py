@@ -1,24 +1,56 @@
 """Task coordinates as features: a constraint row is a fixed combination of a Jacobian's rows."""
 
 from collections.abc import Callable
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
 from unconstrain.errors import DataError
 
 
 class JacobianFeatures(BaseEstimator):
-    """``r(x) = J(x)ᵀ λ``: rows that combine the rows of a task Jacobian, the same way at all states.
+    """Features of rows ``r(x) = J(x)ᵀ λ`` that combine the rows of a task Jacobian, the same way at all states.
 
-    jacobian: function of states X (N, n) that returns J (N, m, d), such as `plants.arm.jacobian`.
+    Parameters
+    ----------
+    jacobian : callable
+        Function of states X (N, n) that returns J (N, m, d), such as a robot's Jacobian of the hand.
+
+    Attributes
+    ----------
+    n_parameters_ : int
+        Number m of task coordinates.
     """
 
-    def __init__(self, jacobian: Callable[[np.ndarray], np.ndarray]):
+    n_parameters_: int
+
+    def __init__(self, jacobian: Callable[[np.ndarray], ArrayLike]):
         self.jacobian = jacobian
 
-    def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "JacobianFeatures":
-        """Learn the number of task coordinates. Raises `DataError` where the Jacobian is not (N, m, d)."""
+    def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> Self:
+        """Learn the number of task coordinates.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+        d : int
+            Number of actions.
+        sample_weight : ndarray of shape (N,), optional
+            Changes nothing.
+
+        Returns
+        -------
+        JacobianFeatures
+            Itself, fitted.
+
+        Raises
+        ------
+        DataError
+            If the Jacobian is not (N, m, d).
+        """
         J = np.asarray(self.jacobian(X[:2]))
         if J.ndim != 3 or J.shape[0] != len(X[:2]) or J.shape[2] != d:
             raise DataError(
@@ -29,9 +61,35 @@ class JacobianFeatures(BaseEstimator):
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """``J(x) q``, (N, m), for states X (N, n) and directions (N, d)."""
+        """Compute the features along directions.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+        directions : ndarray of shape (N, d)
+            One direction a state.
+
+        Returns
+        -------
+        ndarray of shape (N, m)
+            ``J(x) q``.
+        """
         return np.einsum("nmd,nd->nm", self.jacobian(X), directions)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """``J(x)ᵀ λ``, (N, d), for states X (N, n) and λ (m,)."""
+        """Compute the row at states.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+        w : ndarray of shape (m,)
+            Parameters λ.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            ``J(x)ᵀ λ``.
+        """
         return np.einsum("nmd,m->nd", self.jacobian(X), w)

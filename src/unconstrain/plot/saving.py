@@ -1,0 +1,64 @@
+"""Write a figure as PNG, SVG or PDF, whole or not at all."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from unconstrain import atomic
+from unconstrain.errors import UnconstrainError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg", ".pdf")
+"""How the name of a figure's file may end."""
+
+
+def check_suffix(path: str | os.PathLike[str] | None) -> None:
+    """Check that a figure can be written in the format that its name ends in.
+
+    Parameters
+    ----------
+    path : path-like or None
+        Where the figure is to be written; None is no figure.
+
+    Raises
+    ------
+    UnconstrainError
+        If the name ends in anything but `.png`, `.svg` or `.pdf`.
+    """
+    if path is not None and Path(path).suffix.lower() not in SUFFIXES:
+        raise UnconstrainError(
+            f"a figure cannot be written to {Path(path).name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
+            f"{SUFFIXES[-1]}"
+        )
+
+
+def save(figure: "Figure", path: str | os.PathLike[str]) -> Path:
+    """Write a figure as PNG, SVG or PDF, whichever the name ends in; whole or not at all.
+
+    Parameters
+    ----------
+    figure : Figure
+        Of matplotlib.
+    path : path-like
+        Where to write it. The same figure gives the same file, whatever the date.
+
+    Returns
+    -------
+    Path
+        Where it was written.
+
+    Raises
+    ------
+    UnconstrainError
+        If the name ends in anything else, or cannot be written to.
+    """
+    check_suffix(path)
+    path = Path(path)
+    suffix = path.suffix.lower()
+    # Without the date the same figure is the same file.
+    metadata: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
+    with atomic.replacing(path) as temporary:
+        figure.savefig(temporary, format=suffix[1:], dpi=200, metadata=metadata)
+    return path

@@ -1,5 +1,7 @@
 """Learnt constraints: how the motion is shared out among directions, and where the rows point."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -97,7 +99,8 @@ def constraint_figure(learnt: LearntConstraint, demonstrations: Demonstrations) 
     return figure
 
 
-def _draw_in_space(ax: Axes | None, A: np.ndarray, demonstrations: Demonstrations) -> Axes:
+def _draw_in_space(ax: Any, A: np.ndarray, demonstrations: Demonstrations) -> Axes:
+    # Axes in space are a class of their own in matplotlib, which gives them no types.
     if ax is None:
         from matplotlib import pyplot
 

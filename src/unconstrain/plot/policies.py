@@ -275,8 +275,7 @@ def _draw_policy(
 
 
 def _predict(policy: Policy, X: Array) -> Array:
-    predict: Callable[[Array], ArrayLike] = getattr(policy, "predict", policy)
-    P = np.asarray(predict(X), dtype=np.float64)
+    P = np.asarray(policy.predict(X) if hasattr(policy, "predict") else policy(X), dtype=np.float64)
     return P[:, None] if P.ndim == 1 else P
 
 

@@ -127,13 +127,13 @@ class LearntConstraint(BaseEstimator, ABC):
         DataError
             If nothing moves.
         """
-        U = check_actions(U)
-        largest = np.abs(U).max(initial=0.0)
+        actions = check_actions(U)
+        largest = np.abs(actions).max(initial=0.0)
         if largest == 0.0:
             raise DataError("all actions are zero: there is no motion to compare a constraint with")
-        U = U / largest
-        motion = float(np.mean(np.sum(U**2, axis=1)))
-        return 1.0 - metrics.projected_observation_error(U, self.predict(X)) / motion
+        actions = actions / largest
+        motion = float(np.mean(np.sum(actions**2, axis=1)))
+        return 1.0 - metrics.projected_observation_error(actions, self.predict(X)) / motion
 
     def describe(self, X: ArrayLike, action_names: Sequence[str]) -> str:
         """State the rows as equations between the actions, and why there are so many.

@@ -75,7 +75,7 @@ class JacobianFeatures(BaseEstimator):
         ndarray of shape (N, m)
             ``J(x) q``.
         """
-        return np.einsum("nmd,nd->nm", self.jacobian(X), directions)
+        return np.einsum("nmd,nd->nm", np.asarray(self.jacobian(X)), directions)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Compute the row at states.
@@ -92,4 +92,4 @@ class JacobianFeatures(BaseEstimator):
         ndarray of shape (N, d)
             ``J(x)ᵀ λ``.
         """
-        return np.einsum("nmd,m->nd", self.jacobian(X), w)
+        return np.einsum("nmd,m->nd", np.asarray(self.jacobian(X)), w)

@@ -49,7 +49,7 @@ def test_shares_not_looked_at_are_shown_together():
 def test_policies_are_compared_to_one_scale():
     demos = demonstrate(3, random_state=0)
     ax = plot.comparison({"one": LimitCycle(), "twice": lambda X: 2 * LimitCycle()(X)}, demos)
-    one, twice = (arrows for arrows in ax.collections if hasattr(arrows, "scale"))
+    twice, one = (arrows for arrows in ax.collections if hasattr(arrows, "scale"))
     assert one.scale == twice.scale
     np.testing.assert_allclose(2 * one.U, twice.U)
     with pytest.raises(uc.errors.PolicyError, match="1 states and 1 actions"):

@@ -1,7 +1,7 @@
 """Policies as arrows: over the recorded movement, beside each other, and against the recorded actions."""
 
 from collections.abc import Callable, Mapping
-from itertools import combinations
+from itertools import combinations, cycle
 from typing import Protocol
 
 import numpy as np
@@ -139,7 +139,7 @@ def comparison(
     Parameters
     ----------
     policies : mapping from str to policy
-        Policies by name, such as ``{"learnt": policy, "ordinary regression": other}``; the last is drawn on top.
+        Policies by name, such as ``{"learnt": policy, "ordinary regression": other}``; the first is drawn on top.
     demonstrations : Demonstrations
         Recordings whose actions are velocities of the states, of at least two states.
     coordinates : tuple of int
@@ -169,11 +169,11 @@ def comparison(
     shown, cell = _spread(X[:, [i, j]])
     vectors = [_matching(each, demonstrations)[shown][:, [i, j]] for each in policies.values()]
     longest = max(float(np.linalg.norm(each, axis=1).max()) for each in vectors)
-    widths = np.linspace(BEHIND, WIDTH, len(vectors))
-    for k, (name, each) in enumerate(zip(policies, vectors, strict=True)):
-        color = SERIES[k % len(SERIES)]
-        points = X[shown][:, [i, j]]
-        _draw_arrows(ax, points, each, LONGEST_ARROW * cell, color, name, longest, float(widths[k]))
+    points, reach = X[shown][:, [i, j]], LONGEST_ARROW * cell
+    # Narrow arrows over wide ones, so that all are seen where they agree.
+    layers = zip(policies, vectors, cycle(SERIES), np.linspace(WIDTH, BEHIND, len(vectors)), strict=False)
+    for name, each, color, width in reversed(list(layers)):
+        _draw_arrows(ax, points, each, reach, color, name, longest, float(width))
     add_title(ax, "Policies over the recorded movement")
     return ax
 

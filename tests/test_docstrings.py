@@ -32,7 +32,6 @@ UNFINISHED = (
     "unconstrain.recordings.",
     "unconstrain.demonstrations.",
     "unconstrain.constraints.",
-    "unconstrain.moments_file.",
     "unconstrain.storage.",
     "unconstrain.deploy.",
 )

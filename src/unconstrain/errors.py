@@ -18,8 +18,8 @@ class PolicyError(UnconstrainError):
     """A policy asked for what it cannot do: an unknown option, or states of the wrong dimension."""
 
 
-class PolicyFileError(PolicyError):
-    """A policy file that is not one of ours, is damaged, or was written by a newer release."""
+class ArchiveError(DataError):
+    """A saved file that is missing, damaged, of another kind, not of unconstrain, or from a newer release."""
 
 
 class RobotError(UnconstrainError):

@@ -105,7 +105,7 @@ def test_states_alone_are_differentiated(run, movements):
         (["fit", "DATA", *COLUMNS, "--time", "t,x1"], "--time takes one column"),
         (["fit", "DATA", "--state", '"x1, in m",x2', "--action", "u1,u2"], "no column 'x1, in m' for state"),
         (["evaluate", "nowhere.skops", "DATA"], "no such policy file"),
-        (["evaluate", "DATA", "DATA"], "not a policy saved by unconstrain"),
+        (["evaluate", "DATA", "DATA"], "holds no policy saved by unconstrain"),
         (["evaluate", "POLICY", "DATA", "--state", "x1", "--action", "u1"], "maps 2 states to 2 actions"),
         (["rollout", "POLICY", "--start", "0.1"], "--start must have 2 numbers"),
         (["rollout", "POLICY", "--start", "a,b"], "--start must be numbers"),

@@ -21,7 +21,9 @@ def touched(tmp_path):
 
 
 def test_a_folder_is_read_as_a_stream(run, folder):
-    code, out, err = run("fit", folder, *COLUMNS, "--model", "linear", "--checkpoint", "run.npz")
+    code, out, err = run(
+        "fit", folder, *COLUMNS, "--model", "linear", "--resumable", "--checkpoint", "run.npz"
+    )
     assert code == 0, err
     assert f"read: {len(X)} samples in {len(np.unique(EPISODES))} episodes" in out
     assert "of observed motion explained" in out
@@ -54,7 +56,7 @@ def test_what_needs_all_data_gets_a_folder_at_once(run, folder, tmp_path):
 
 def test_a_cluster_of_this_machine(run, folder):
     pytest.importorskip("distributed")
-    code, _, err = run("fit", folder, *COLUMNS, "--model", "linear", "--cluster", "local")
+    code, _, err = run("fit", folder, *COLUMNS, "--model", "linear", "--resumable", "--cluster", "local")
     assert code == 0, err
     assert_same_fit(
         uc.load_policy("policy.skops"), uc.ParametricPolicy(alpha="cv").fit(X, U, groups=EPISODES)
@@ -86,7 +88,7 @@ def test_what_is_known_of_constraints_is_used(run, touched, where):
     if "--cluster" in where:
         pytest.importorskip("distributed")
     options = ("--force", "f0,f1,f2", "--force-threshold", 2, "--free", "free")
-    code, out, err = run("fit", touched, *COLUMNS, "--model", "linear", *options, *where)
+    code, out, err = run("fit", touched, *COLUMNS, "--model", "linear", "--resumable", *options, *where)
     assert code == 0, err
     whole = known.in_memory(
         uc.ParametricPolicy(alpha="cv"), f"{touched}/part-0.parquet", known.COLUMNS, "force and free"

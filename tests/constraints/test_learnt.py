@@ -176,7 +176,9 @@ def test_constraints_are_saved_and_loaded(tmp_path):
             uc.load_constraint(tmp_path / "c.skops").predict(X), estimator.predict(X)
         )
     uc.ParametricPolicy().fit(X, U).save(tmp_path / "p.skops")
-    with pytest.raises(uc.errors.PolicyFileError, match="holds a ParametricPolicy, not a constraint"):
+    with pytest.raises(
+        uc.errors.ArchiveError, match="holds a policy, not a constraint: load it with load_policy"
+    ):
         uc.load_constraint(tmp_path / "p.skops")
 
 

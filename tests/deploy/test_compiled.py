@@ -1,7 +1,7 @@
 import copy
+import json
 import pickle
 import threading
-import zipfile
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from sklearn.preprocessing import PolynomialFeatures, SplineTransformer
 
 import unconstrain as uc
+from unconstrain import storage
 from unconstrain.deploy import compilation
 from unconstrain.deploy.compiled import KINDS, Linear
 
@@ -148,10 +149,12 @@ def test_saved_pickled_and_copied_it_is_the_same(name, tmp_path):
 def test_the_file_is_what_the_documentation_says(name, tmp_path):
     STEPS[name].save(tmp_path / "step")  # whatever its suffix
     with np.load(tmp_path / "step", allow_pickle=False) as archive:
-        kind = str(archive["kind"])
-        assert int(archive["format"]) == 1
-        assert str(archive["release"]) == uc.__version__
-        assert set(archive.files) == {"format", "kind", "release", *KINDS[kind].layout}
+        about = json.loads(archive["unconstrain.json"])
+        kind = about["tree"]["kind"]
+        assert about == {
+            "kind": "compiled policy", "layout": 1, "release": uc.__version__, "tree": {"kind": STEPS[name].kind},
+        }  # fmt: skip
+        assert set(archive.files) == {"unconstrain.json", *KINDS[kind].layout}
         assert all(archive[each].dtype == np.float64 for each in KINDS[kind].layout)
 
 
@@ -217,46 +220,51 @@ def test_compilation_notices_where_the_two_differ(monkeypatch):
         POLICIES["linear"].compile()
 
 
-def damaged(tmp_path, **changes):
+def written(tmp_path, tree, **changes):
     path = tmp_path / "step.npz"
-    arrays = {"format": 1, "kind": "linear", "release": "9.0", "coef": np.eye(3), "intercept": np.zeros(3)}
-    arrays |= changes
-    np.savez(path, **{name: value for name, value in arrays.items() if value is not None})
+    arrays = {"coef": np.eye(3), "intercept": np.zeros(3)} | changes
+    kept = {name: array for name, array in arrays.items() if array is not None}
+    storage.write(path, storage.Kind.COMPILED_POLICY, tree, kept)
     return path
 
 
+LINEAR = {"kind": "linear"}
+
+
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    ("tree", "changes", "sentence"),
     [
-        ({"kind": None}, "not a compiled policy"),
-        ({"format": "one"}, "not a compiled policy"),
-        ({"kind": np.array([{}], dtype=object)}, "not a compiled policy"),
-        ({"format": 2}, r"written by unconstrain 9\.0.*upgrade"),
-        ({"kind": "neural"}, r"neural.*upgrade"),
-        ({"coef": np.full((3, 3), np.nan)}, "damaged"),
-        ({"intercept": np.zeros(2)}, r"damaged \(intercept .* must have shape \(3,\)"),
-        ({"intercept": None}, "damaged"),
+        (None, {}, "damaged"),
+        ({}, {}, "damaged"),
+        ({"kind": "neural"}, {}, "damaged"),
+        ({"kind": ["linear"]}, {}, "damaged"),
+        (LINEAR, {"coef": np.full((3, 3), np.nan)}, "damaged"),
+        (LINEAR, {"coef": np.array([["a"]])}, "damaged"),
+        (LINEAR, {"intercept": np.zeros(2)}, r"damaged \(intercept .* must have shape \(3,\)"),
+        (LINEAR, {"intercept": None}, "damaged"),
+        (LINEAR, {"self": np.zeros(2)}, "damaged"),
     ],
 )
-def test_files_that_are_not_right_are_told_in_one_sentence(changes, sentence, tmp_path):
-    with pytest.raises(uc.errors.PolicyFileError, match=sentence) as caught:
-        uc.load_compiled(damaged(tmp_path, **changes))
+def test_files_that_are_not_right_are_told_in_one_sentence(tree, changes, sentence, tmp_path):
+    with pytest.raises(uc.errors.ArchiveError, match=sentence) as caught:
+        uc.load_compiled(written(tmp_path, tree, **changes))
     assert "\n" not in str(caught.value)
 
 
 def test_files_cut_or_foreign_or_missing(tmp_path):
-    path = damaged(tmp_path)
+    path = written(tmp_path, LINEAR)
     path.write_bytes(path.read_bytes()[:300])
-    with pytest.raises(uc.errors.PolicyFileError, match="damaged"):
+    with pytest.raises(uc.errors.ArchiveError, match="damaged"):
         uc.load_compiled(path)
     (tmp_path / "notes.txt").write_text("hello")
-    with pytest.raises(uc.errors.PolicyFileError, match="not a compiled policy"):
+    with pytest.raises(uc.errors.ArchiveError, match="holds no compiled policy saved by unconstrain"):
         uc.load_compiled(tmp_path / "notes.txt")
-    with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
-        archive.writestr("a.txt", "hello")
-    with pytest.raises(uc.errors.PolicyFileError, match="not a compiled policy"):
-        uc.load_compiled(tmp_path / "other.zip")
-    with pytest.raises(uc.errors.PolicyFileError, match="no such"):
+    POLICIES["linear"].save(tmp_path / "policy.skops")
+    with pytest.raises(
+        uc.errors.ArchiveError, match="holds a policy, not a compiled policy: load it with load_policy"
+    ):
+        uc.load_compiled(tmp_path / "policy.skops")
+    with pytest.raises(uc.errors.ArchiveError, match="no such"):
         uc.load_compiled(tmp_path / "nothing.npz")
 
 

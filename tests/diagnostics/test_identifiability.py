@@ -230,7 +230,7 @@ def test_diagnose_warns_says_and_stops(tmp_path):
     everywhere = toy.demonstrate(40, random_state=0)
     left = everywhere.select(everywhere.states[:, 0] < 0)
     policy = uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.5)).fit(left.states, left.actions)
-    policy.save(saved)
+    policy.save(saved, resumable=True)
     move = ["rollout", saved, "--start=-0.7,0", "--steps", "400"]  # the cycle leads to the right
     paths = ["--out", str(tmp_path / "path.csv"), "--figure", str(tmp_path / "path.png")]
     stopped = CliRunner().invoke(app, [*move, *paths, "--stop-when-unsure", "0.3"])

@@ -354,7 +354,10 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path, other, what):
 
 def test_a_checkpoint_that_is_none_is_refused(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
-    for content, sentence in [(b"hello", "holds no checkpoint saved by"), (b"PK\x03\x04 cut off", "damaged")]:
+    for content, sentence in [(b"hello", "holds no checkpoint saved by"), (None, "damaged")]:
+        if content is None:
+            stream.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, checkpoint=tmp_path / "ours.npz")
+            content = (tmp_path / "ours.npz").read_bytes()[:1000]
         (tmp_path / "run.npz").write_bytes(content)
         with pytest.raises(uc.errors.UnconstrainError, match=sentence):
             stream.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, checkpoint=tmp_path / "run.npz")

@@ -15,8 +15,6 @@ from reproduction.plants import arm
 from tests import written
 from tests.scaling.test_stream import CENTERS, COLUMNS, EPISODES, TIME, U, X, assert_same_fit
 from unconstrain import metrics as risk
-from unconstrain import moments_file
-from unconstrain.scaling import checkpoint
 
 TOUCHED = written.touched(U, EPISODES)
 N = np.column_stack([TOUCHED[f"n{j}"] for j in range(9)]).reshape(-1, 3, 3)
@@ -226,16 +224,6 @@ def test_a_checkpoint_belongs_to_what_was_known(tmp_path):
     for batch in ((X, U), (X, U, None, np.full_like(N, np.nan))):
         with pytest.raises(uc.errors.UnconstrainError, match="checkpoint of another source"):
             uc.fit_stream(uc.ParametricPolicy(), [batch], checkpoint=file)
-
-
-def test_checkpoints_from_before_constraints_were_counted_are_read(tmp_path):
-    file = tmp_path / "run.npz"
-    batches = [(X[:300], U[:300]), (X[300:], U[300:])]
-    uc.fit_stream(uc.ParametricPolicy(), batches, checkpoint=file)
-    about, arrays = moments_file.read(file, (checkpoint.KIND,))
-    del about["known"]
-    moments_file.write(file, about, arrays)
-    assert uc.fit_stream(uc.ParametricPolicy(), batches, checkpoint=file).n_known_constraints_ == 0
 
 
 def test_policies_from_before_constraints_were_counted_go_on():

@@ -59,6 +59,12 @@ def fit(
     min_duration: recordings.MinDuration = None,
     checkpoint: streams.Checkpoint = None,
     cluster: streams.Cluster = None,
+    resumable: Annotated[
+        bool,
+        typer.Option(
+            "--resumable", help="Keep the moments too: for learning on, and for rollout --stop-when-unsure."
+        ),
+    ] = False,
 ) -> None:
     """Learn the unconstrained policy behind recordings, and save it.
 
@@ -88,7 +94,7 @@ def fit(
             console, named[model] if named else None, files, how | told, checkpoint, cluster, **needs_memory
         )
         streamed.recording_ = how
-        streamed.save(out)
+        streamed.save(out, resumable=resumable)
         _point_on(console, out)
         return
     with console.status("reading"):
@@ -123,7 +129,7 @@ def fit(
     if figure is not None:
         plot.save(plot.policy_figure(policy, demos), figure)
         console.print(f"figure: {figure}")
-    policy.save(out)
+    policy.save(out, resumable=resumable)
     _point_on(console, out)
     start = ",".join(f"{value:.3g}" for value in demos.states[0])
     if demos.states.shape[1] == demos.actions.shape[1]:

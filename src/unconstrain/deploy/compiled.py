@@ -17,20 +17,16 @@ activation is taken out of the others only far away from all centres, where they
 """
 
 import threading
-import zipfile
-import zlib
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy import add, divide, exp, multiply, ndarray, subtract
 
-from unconstrain import atomic
-from unconstrain.errors import PolicyError, PolicyFileError
+from unconstrain.errors import PolicyError
 from unconstrain.receptive import normalized_activations
+from unconstrain.storage import Kind, archive
 
-FORMAT = 1
 BLOCK_ROWS = 4096
 
 # Where the activations' sum is less than this, their own precision (they are subnormal, or zero) is in doubt.
@@ -99,10 +95,7 @@ class CompiledPolicy:
 
     def save(self, path: str | Path) -> None:
         """Write the arrays to `path` as NPZ, in the layout of docs/compiled.md, to be read by `load_compiled`."""
-        contents: dict[str, Any] = {"format": FORMAT, "kind": self.kind, "release": version("unconstrain")}
-        contents |= self.arrays
-        with atomic.replacing(path) as temporary, open(temporary, "wb") as file:
-            np.savez(file, **contents)
+        archive.write(path, Kind.COMPILED_POLICY, {"kind": self.kind}, self.arrays)
 
     def magnitude(self, X: ndarray) -> float:
         """The largest term that is added up on the way to the actions at X (N, n): what rounding is relative to."""
@@ -443,29 +436,13 @@ KINDS: dict[str, type[CompiledPolicy]] = {
 def load_compiled(path: str | Path) -> CompiledPolicy:
     """The compiled policy that `step.save(path)` wrote. Holds arrays only; nothing in the file is executed.
 
-    Raises `PolicyFileError` for a file that is missing, not a compiled policy, damaged, or from a newer release.
+    Raises `ArchiveError` for a file that is missing, not a compiled policy, damaged, or from a newer release.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise PolicyFileError(f"{path}: there is no such compiled policy")
+    tree, arrays = archive.read(path, Kind.COMPILED_POLICY)
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        note = int(arrays.pop("format")), str(arrays.pop("kind")), str(arrays.pop("release"))
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError) as error:
-        raise PolicyFileError(f"{path} is damaged ({error}): save the compiled policy again") from None
-    except (KeyError, ValueError, TypeError, AttributeError, SyntaxError):
-        raise PolicyFileError(f"{path} is not a compiled policy (NPZ) saved by unconstrain") from None
-    form, kind, release = note
-    if form > FORMAT or kind not in KINDS:
-        raise PolicyFileError(
-            f"{path} was written by unconstrain {release}, in a newer format or of a kind ({kind}) this release "
-            f"({version('unconstrain')}) does not know: upgrade unconstrain"
-        )
-    try:
-        return KINDS[kind](**arrays)
-    except (PolicyError, ValueError, TypeError) as error:
-        raise PolicyFileError(f"{path} is damaged ({error}): save the compiled policy again") from None
+        return KINDS[tree["kind"]](**arrays)
+    except (PolicyError, ValueError, TypeError, KeyError) as error:
+        raise archive.damaged(path, Kind.COMPILED_POLICY, str(error)) from None
 
 
 class _Scratch(threading.local):

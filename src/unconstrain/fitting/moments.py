@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from unconstrain.parallel import blocks, shared_out
+from unconstrain.storage import Kind, load_object, save_object
 
 # λ relative to the mean eigenvalue of H. What rounding leaves of g where H is silent is then divided by enough to stay
 # a millionth of the policy.
@@ -59,6 +60,31 @@ class Moments:
             self.weight + other.weight,
             self.n_samples + other.n_samples,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Of the symmetric H a triangle says everything, in files and on the way to other machines.
+        P = self.H.shape[-1]
+        return {
+            "n_samples": self.n_samples,
+            "triangle": self.H[..., *np.tril_indices(P)],
+            "g": self.g,
+            "squares": np.asarray(self.squares),
+            "weight": np.asarray(self.weight),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.g, self.squares, self.weight = state["g"], state["squares"], state["weight"]
+        self.n_samples = int(state["n_samples"])
+        *batch, P, _ = self.g.shape
+        triangle = state["triangle"]
+        if triangle.shape != (*batch, P * (P + 1) // 2) or not (
+            self.squares.shape == self.weight.shape == tuple(batch)
+        ):
+            raise ValueError("the shapes of moments do not go together")
+        self.H = np.empty((*batch, P, P))
+        rows, columns = np.tril_indices(P)
+        self.H[..., rows, columns] = triangle
+        self.H[..., columns, rows] = triangle
 
     @staticmethod
     def sum(parts: Iterable["Moments"]) -> "Moments":
@@ -140,20 +166,44 @@ class Spectrum:
 
 
 def save(moments: Moments | Sequence[Moments | None], path: str | PathLike[str]) -> None:
-    """Write moments, one or by fold (as a policy's `moments_`), to an NPZ file, whole or not at all.
+    """Write moments to a file that `load` reads.
 
-    Raises `UnconstrainError` where the place cannot be written to. The layout is described in `moments_file`.
+    Parameters
+    ----------
+    moments : Moments, or sequence of Moments or None
+        One, or by fold as a policy's `moments_`.
+    path : path
+        An existing file is replaced.
+
+    Raises
+    ------
+    UnconstrainError
+        The place cannot be written to.
     """
-    from unconstrain import moments_file  # which knows what moments are
-
-    moments_file.save(moments, path)
+    save_object(path, Kind.MOMENTS, moments if isinstance(moments, Moments) else list(moments))
 
 
-def load(path: str | PathLike[str]) -> Any:
-    """The `Moments`, or list of them by fold (None where empty), that `save` wrote to `path`.
+def load(path: str | PathLike[str]) -> Moments | list[Moments | None]:
+    """Read what `save` wrote.
 
-    Raises `UnconstrainError` for a file that is missing, foreign, damaged, or from a newer release.
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Moments, or list of Moments or None
+        As they were given to `save`.
+
+    Raises
+    ------
+    ArchiveError
+        The file is missing, damaged, does not hold moments, or is from a newer release.
     """
-    from unconstrain import moments_file
+    return load_object(path, Kind.MOMENTS, object, _check_moments)
 
-    return moments_file.load(path)
+
+def _check_moments(found: object) -> None:
+    parts = found if isinstance(found, list) else [found]
+    if not all(isinstance(part, Moments) or (part is None and part is not found) for part in parts):
+        raise TypeError("it holds other things than moments")

@@ -29,12 +29,16 @@ from unconstrain.fitting.observation import RISKS, Sight, informative, sight, un
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.fitting.tally import Tally
 from unconstrain.motion import NO_MOTION, lengths, moving
-from unconstrain.policies import persistence
+from unconstrain.storage import Kind, save_object
 
 NO_DIRECTION = (
     "all actions are zero, and a zero action has no direction to learn from: check the action columns, "
     "or differentiate the states over a longer window"
 )
+
+ADDED_UP = ("moments_", "folds_")
+"""What only learning on, uncertainty and solving anew need: sums over samples, and the folds of episodes."""
+LARGEST_DIMENSION = 10**6
 
 
 class Policy(RegressorMixin, BaseEstimator, ABC):
@@ -124,10 +128,36 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             U, P = U * root, P * root
         return metrics.explained(U, P)
 
-    def save(self, path: str | Path) -> None:
-        """Write the policy to `path` (customarily `.skops`), to be read by `load_policy`. Holds no pickle."""
+    def save(self, path: str | Path, *, resumable: bool = False) -> None:
+        """Write the policy to a file that `load_policy` reads. Nothing in it is code.
+
+        Parameters
+        ----------
+        path : path
+            Customarily it ends in ``.skops``. An existing file is replaced.
+        resumable : bool
+            Keep the moments too. Without them the file is small, and the policy that is read back predicts, but cannot
+            learn on (`partial_fit`), tell how sure it is (`return_std`), or be solved anew (`solved`).
+
+        Raises
+        ------
+        UnconstrainError
+            The place cannot be written to, or the policy holds something that cannot be saved, such as a lambda.
+        """
         check_is_fitted(self)
-        persistence.save(self, path)
+        kept = copy(self)
+        if not resumable:
+            for name in ADDED_UP:
+                kept.__dict__.pop(name, None)
+        save_object(path, Kind.POLICY, kept, check_usable)
+
+    def __getattr__(self, name: str):
+        if name in ADDED_UP and "n_samples_seen_" in vars(self):
+            raise PolicyError(
+                "this policy was saved without its moments, which learning on, uncertainty and solving anew need: "
+                "save it with save(path, resumable=True)"
+            )
+        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}", name=name, obj=self)
 
     def compile(self) -> CompiledPolicy:
         """The fitted policy for a control loop: `step = policy.compile()`; `step(x)` for states (n,) or (N, n).
@@ -327,3 +357,26 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         tags.target_tags.single_output = True
         tags.target_tags.multi_output = True
         return tags
+
+
+def check_usable(policy: Policy) -> None:
+    """Check that a policy is fitted and acts at the origin.
+
+    Parameters
+    ----------
+    policy : Policy
+
+    Raises
+    ------
+    ValueError
+        It does not act there, and something else where it cannot act at all.
+    """
+    check_is_fitted(policy)
+    n, d = policy.n_features_in_, policy.n_actions_
+    if not all(isinstance(each, int) and 0 < each <= LARGEST_DIMENSION for each in (n, d)):
+        raise TypeError("it has no dimensions")
+    actions = policy.predict(np.zeros((1, n)))
+    if actions.reshape(1, -1).shape != (1, d) or (actions.ndim == 1) != policy.actions_are_scalars_:
+        raise TypeError(f"its actions have shape {actions.shape}")
+    if not np.isfinite(actions).all():
+        raise ValueError("its actions are not finite")

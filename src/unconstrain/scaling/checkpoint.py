@@ -1,23 +1,18 @@
 """Where a stream stands, in a file: what was added up, what was placed, and up to which row.
 
-An NPZ file as `moments_file` writes them, of kind "checkpoint". Its arrays are the moments by fold, and `policy`, the
-bytes of the skops file of the policy with everything placed and its episodes dealt out to folds.
+An archive that holds the policy with everything placed and its episodes dealt out to folds, and the moments by fold.
 """
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import joblib
-import numpy as np
-import skops.io
 
-from unconstrain import moments_file
 from unconstrain.errors import UnconstrainError
 from unconstrain.fitting.tally import Tally
 from unconstrain.policies.base import Policy
-
-KIND = "checkpoint"
+from unconstrain.storage import Kind, foreign_parts, load_object, save_object
 
 
 @dataclass(frozen=True)
@@ -40,56 +35,61 @@ def identity(policy: Policy, source: str, settings: dict[str, Any]) -> dict[str,
 
 
 def save(path: str | os.PathLike[str], belongs_to: dict[str, str], progress: Progress) -> None:
-    """Write a checkpoint, whole or not at all."""
-    tally = progress.tally
-    arrays, counts = moments_file.packed(tally.moments)
-    arrays["policy"] = np.frombuffer(skops.io.dumps(progress.policy), dtype=np.uint8)
-    about = {
-        "kind": KIND,
-        "belongs_to": belongs_to,
-        "n_samples": counts,
-        "seen": tally.n_samples,
-        "zero": tally.n_zero,
-        "longest": tally.longest,
-        "shortest": None if np.isinf(tally.shortest) else tally.shortest,
-        "known": tally.n_known,
-        "done": progress.done,
-        "longest_known": progress.longest,
-    }
-    moments_file.write(path, about, arrays)
+    """Write a checkpoint, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    belongs_to : dict
+        As `identity` returned it.
+    progress : Progress
+        Where the stream stands.
+
+    Raises
+    ------
+    UnconstrainError
+        The place cannot be written to, or the policy holds something that cannot be saved, such as a lambda.
+    """
+    reached = {field.name: getattr(progress, field.name) for field in fields(Progress)}
+    save_object(path, Kind.CHECKPOINT, {"belongs_to": belongs_to, **reached})
 
 
 def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy) -> Progress | None:
-    """Where the stream stood, or None where there is no such file yet.
+    """Read where a stream stood.
 
-    given: the policy as the user gives it; types it holds are trusted to be in the file.
-    Raises `UnconstrainError` for a file that is damaged, foreign, or belongs to something else.
+    Parameters
+    ----------
+    path : path
+    belongs_to : dict
+        As `identity` returned it.
+    given : Policy
+        As the user gives it; classes and functions that it holds are trusted to be in the file.
+
+    Returns
+    -------
+    Progress or None
+        None where there is no such file yet.
+
+    Raises
+    ------
+    UnconstrainError
+        The file is damaged, is no checkpoint, or belongs to something else.
     """
     if not os.path.lexists(path):
         return None
-    about, arrays = moments_file.read(path, (KIND,))
-    try:
-        other = [what for what, value in belongs_to.items() if about["belongs_to"][what] != value]
-        if other:
-            raise UnconstrainError(
-                f"{path} is the checkpoint of another {other[0]}: give another file, or delete this one to start anew"
-            )
-        data = arrays.pop("policy").tobytes()
-        trusted = skops.io.get_untrusted_types(data=skops.io.dumps(given))
-        ours = [name for name in skops.io.get_untrusted_types(data=data) if name.startswith("unconstrain.")]
-        policy = skops.io.loads(data, trusted=sorted({*trusted, *ours}))
-        tally = Tally(
-            tuple(moments_file.unpacked(about["n_samples"], arrays)),
-            int(about["seen"]),
-            int(about["zero"]),
-            float(about["longest"]),
-            np.inf if about["shortest"] is None else float(about["shortest"]),
-            int(about.get("known", 0)),  # not in checkpoints of streams that carried none
-        )
-        return Progress(policy, tally, int(about["done"]), float(about["longest_known"]))
-    except UnconstrainError:
-        raise
-    except Exception as error:  # whatever a file that only looks like ours makes readers stumble over
+    found = load_object(path, Kind.CHECKPOINT, dict, _check, trusted=foreign_parts(given))
+    other = [what for what, value in belongs_to.items() if found["belongs_to"][what] != value]
+    if other:
         raise UnconstrainError(
-            f"{path} is damaged and cannot be gone on from ({type(error).__name__}): delete it to start anew"
-        ) from error
+            f"{path} is the checkpoint of another {other[0]}: give another file, or delete this one to start anew"
+        )
+    return Progress(**{field.name: found[field.name] for field in fields(Progress)})
+
+
+def _check(found: dict[str, Any]) -> None:
+    kinds = {"policy": Policy, "tally": Tally, "done": int, "longest": float}
+    if set(found) != {"belongs_to", *kinds} or set(found["belongs_to"]) != {"policy", "source", "settings"}:
+        raise TypeError("it holds other things than a checkpoint")
+    wrong = [name for name, kind in kinds.items() if not isinstance(found[name], kind)]
+    if wrong:
+        raise TypeError(f"it holds another {wrong[0]}")

@@ -1,9 +1,9 @@
 """What learnt constraints share: rows give projections, and projections a score."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,11 @@ from sklearn.utils.validation import check_is_fitted
 from unconstrain import metrics
 from unconstrain.arrays import check_actions, check_groups, check_samples, check_states
 from unconstrain.constraints.learnt.lines import equation, mean_line
-from unconstrain.errors import DataError, PolicyError, PolicyFileError
+from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.solve import splits
-from unconstrain.policies import persistence
+from unconstrain.storage import Kind, load_object, save_object
+
+LARGEST_DIMENSION = 10**4
 
 
 class LearntConstraint(BaseEstimator, ABC):
@@ -161,17 +163,22 @@ class LearntConstraint(BaseEstimator, ABC):
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write the constraint to a file, to be read by `load_constraint`.
+        """Write the constraint to a file that `load_constraint` reads. Nothing in it is code.
 
-        A task Jacobian of your own is saved by the name of its function, and has to be importable where it is read.
+        A task Jacobian of your own is saved by the name of its function; give `load_constraint` the function again.
 
         Parameters
         ----------
-        path : path-like
-            Where to write it, customarily `.skops`.
+        path : path
+            Customarily it ends in ``.skops``. An existing file is replaced.
+
+        Raises
+        ------
+        UnconstrainError
+            The place cannot be written to, or the constraint holds something that cannot be saved, such as a lambda.
         """
         check_is_fitted(self)
-        persistence.save(self, path)
+        save_object(path, Kind.CONSTRAINT, self, _check_usable)
 
     def _check_samples(
         self, X: ArrayLike, U: ArrayLike, groups: ArrayLike | None
@@ -234,29 +241,40 @@ def held_out_projections(
     return N
 
 
-def load_constraint(path: str | Path, *, trusted: Sequence[str] = ()) -> LearntConstraint:
-    """Read the constraint that ``constraint.save(path)`` wrote.
+def load_constraint(path: str | Path, *, trusted: Iterable[Any] = ()) -> LearntConstraint:
+    """Read a constraint that `constraint.save(path)` wrote.
+
+    Nothing in the file is run, whoever wrote it.
 
     Parameters
     ----------
-    path : path-like
-        The file.
-    trusted : sequence of str
-        As for `load_policy`.
+    path : path
+    trusted : classes and functions, optional
+        Those of your own that the constraint holds, such as a task Jacobian. The file has only their names, so give
+        the classes and functions themselves.
 
     Returns
     -------
-    ConstantConstraint or FeatureConstraint
-        The constraint, fitted.
+    LearntConstraint
+        A fitted one, found to answer.
 
     Raises
     ------
-    PolicyFileError
-        If the file is missing, damaged, of a newer release, or not a constraint.
+    ArchiveError
+        The file is missing, damaged, not a constraint, or from a newer release, or holds something that is not trusted.
     """
-    loaded = persistence.load_policy(path, trusted=trusted)
-    if not isinstance(loaded, LearntConstraint):
-        raise PolicyFileError(
-            f"{path} holds a {type(loaded).__name__}, not a constraint: load it with load_policy"
-        )
-    return loaded
+    return load_object(
+        path, Kind.CONSTRAINT, LearntConstraint, _check_usable, trusted=trusted, loader="load_constraint"
+    )
+
+
+def _check_usable(constraint: LearntConstraint) -> None:
+    check_is_fitted(constraint)
+    n, d = constraint.n_features_in_, constraint.n_actions_
+    if not all(isinstance(each, int) and 0 < each <= LARGEST_DIMENSION for each in (n, d)):
+        raise TypeError("it has no dimensions")
+    projections = constraint.predict(np.zeros((1, n)))
+    if projections.shape != (1, d, d):
+        raise TypeError(f"its projections have shape {projections.shape}")
+    if not np.isfinite(projections).all():
+        raise ValueError("its projections are not finite")

@@ -1,0 +1,164 @@
+"""The closed list of classes that files may hold, and what is checked of them once they are restored.
+
+A file holds a name such as ``unconstrain.NormalizedRBF`` or ``sklearn.Pipeline``: the distribution and the class,
+whatever module the class lives in. The name only chooses from the lists below; no module is ever imported, and nothing
+looked up, by a name that a file holds. A class belongs here if its state is data and its methods do with it what they
+say, however the state was made up.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+_HOMES: Mapping[str, tuple[str, ...]] = {
+    "unconstrain.policies.parametric": ("ParametricPolicy",),
+    "unconstrain.policies.locally_linear": ("LocallyLinearPolicy",),
+    "unconstrain.features.full": ("FullFeatures",),
+    "unconstrain.features.decoupled": ("DecoupledFeatures",),
+    "unconstrain.features.potential": ("PotentialFeatures",),
+    "unconstrain.features.rbf": ("NormalizedRBF",),
+    "unconstrain.fitting.moments": ("Moments",),
+    "unconstrain.fitting.solve": ("EpisodeFolds",),
+    "unconstrain.fitting.tally": ("Tally",),
+    "unconstrain.constraints.learnt.constant": ("ConstantConstraint",),
+    "unconstrain.constraints.learnt.feature": ("FeatureConstraint",),
+    "unconstrain.constraints.learnt.jacobian": ("JacobianFeatures",),
+    "unconstrain.recordings.columns": ("Columns",),
+    "unconstrain.recordings.preparation": ("Preparation",),
+    "sklearn.compose": ("ColumnTransformer",),
+    "sklearn.decomposition": ("PCA", "TruncatedSVD"),
+    "sklearn.kernel_approximation": ("Nystroem", "RBFSampler"),
+    "sklearn.pipeline": ("FeatureUnion", "Pipeline"),
+    "sklearn.preprocessing": (
+        "Binarizer",
+        "FunctionTransformer",
+        "KBinsDiscretizer",
+        "MaxAbsScaler",
+        "MinMaxScaler",
+        "Normalizer",
+        "OneHotEncoder",
+        "PolynomialFeatures",
+        "PowerTransformer",
+        "QuantileTransformer",
+        "RobustScaler",
+        "SplineTransformer",
+        "StandardScaler",
+    ),
+}
+
+_MODULES = {f"{home.partition('.')[0]}.{name}": home for home, names in _HOMES.items() for name in names}
+
+_CIRCUMSTANCES = ("memory", "n_jobs")
+"""Attributes of scikit-learn's that say where and by how many a thing is computed: a file must not choose those."""
+
+LARGEST_EXPANSION = 10**6
+"""How many columns a transformer may make of one state, at most."""
+
+
+def names() -> tuple[str, ...]:
+    """List the names of all classes that files may hold."""
+    return tuple(_MODULES)
+
+
+@cache
+def class_of(name: str) -> type | None:
+    """Find the class of a name.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    type or None
+        None where the list does not have the name.
+    """
+    if name not in _MODULES:
+        return None
+    found: type = getattr(import_module(_MODULES[name]), name.partition(".")[2])
+    return found
+
+
+def name_of(cls: type) -> str | None:
+    """Find the name under which files hold objects of a class.
+
+    Parameters
+    ----------
+    cls : type
+
+    Returns
+    -------
+    str or None
+        None where the list does not have the class.
+    """
+    name = f"{cls.__module__.partition('.')[0]}.{cls.__qualname__}"
+    return name if class_of(name) is cls else None
+
+
+def without_circumstances(name: str, state: Any) -> Any:
+    """Take from a state what says where, and by how many processes, a thing is computed.
+
+    Parameters
+    ----------
+    name : str
+        Of the class.
+    state : object
+        What `__getstate__` returned.
+
+    Returns
+    -------
+    object
+    """
+    if not (name.startswith("sklearn.") and isinstance(state, dict)):
+        return state
+    return {key: None if key in _CIRCUMSTANCES else value for key, value in state.items()}
+
+
+def check_restored(made: Any) -> None:
+    """Check what an object's methods take for granted, and would run out of time or memory without.
+
+    Parameters
+    ----------
+    made : object
+        Of a listed class, just restored.
+
+    Raises
+    ------
+    ValueError
+        Its state cannot be that of a fitted object.
+    """
+    check = _CHECKS.get(type(made).__name__)
+    if check is not None and not check(vars(made)):
+        raise ValueError(f"the state of a {type(made).__name__} is not one it can have")
+
+
+def _plausible_polynomials(state: Mapping[str, Any]) -> bool:
+    fitted: list[Any] = [
+        state.get(name) for name in ("n_features_in_", "_min_degree", "_max_degree", "_n_out_full")
+    ]
+    if all(each is None for each in fitted):
+        return True
+    if not all(type(each) is int for each in fitted):
+        return False
+    n, least, degree, columns = fitted
+    # Where both are more than this, the number of columns is too large even to be computed.
+    if min(n, degree) > 20 or not (0 < n <= LARGEST_EXPANSION and 0 <= least <= degree <= LARGEST_EXPANSION):
+        return False
+    return columns <= math.comb(n + degree, degree) <= LARGEST_EXPANSION
+
+
+def _plausible_splines(state: Mapping[str, Any]) -> bool:
+    if "bsplines_" not in state:
+        return True
+    splines = state["bsplines_"]
+    (k,) = {spline.c.shape[1] for spline in splines}
+    columns = len(splines) * (k if state["include_bias"] else k - 1)
+    return bool(state["n_features_in_"] == len(splines) and state["n_features_out_"] == columns)
+
+
+_CHECKS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
+    "PolynomialFeatures": _plausible_polynomials,
+    "SplineTransformer": _plausible_splines,
+}

@@ -31,7 +31,10 @@ UNFINISHED = (
     "unconstrain.scaling.",
     "unconstrain.recordings.",
     "unconstrain.demonstrations.",
-    "unconstrain.constraints.",
+    "unconstrain.constraints.recorded.",
+    "unconstrain.constraints.forces.",
+    "unconstrain.constraints.measured.",
+    "unconstrain.constraints.nullspace.",
     "unconstrain.storage.",
     "unconstrain.deploy.",
 )

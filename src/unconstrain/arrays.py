@@ -1,30 +1,81 @@
-"""Arrays a user hands over, checked once at the door.
+"""Check arrays and numbers that users hand over, once, where they come in.
 
-scikit-learn decides what an acceptable array is (`validate_data`); here its verdict becomes one sentence
-of ours, and what it reports only in passing (which row holds the NaN) is named.
+scikit-learn decides what an acceptable array is (`validate_data`); its verdict becomes one sentence here, which also
+names what it reports only in passing, such as the row that holds a NaN. scikit-learn is imported when it is asked.
 """
 
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
 
 import numpy as np
-from sklearn.utils.validation import (
-    _check_sample_weight,
-    check_array,
-    check_consistent_length,
-    validate_data,
-)
+from numpy.typing import ArrayLike
 
 from unconstrain.errors import DataError, PolicyError
 
+if TYPE_CHECKING:
+    from sklearn.base import BaseEstimator
+
+SQUARABLE = 1e150
+"""Numbers between the inverse of this and this can be squared and summed in double precision."""
+
 ROUNDED = 0.05
+"""How far `N N v` may be from `N v` in each component: projections rounded to two decimals pass."""
+
 NOT_IDEMPOTENT = (
     "is none, since applied twice it does something else than applied once: give N = I - A⁺A, as "
     "constraints.projection(A) makes it of the rows A"
 )
 
 
+def check_numbers(array: ArrayLike, name: str) -> np.ndarray:
+    """Convert to an array of float64, of any shape.
+
+    Parameters
+    ----------
+    array : array_like
+        Numbers.
+    name : str
+        What the array is, to begin the sentence of an error with.
+
+    Returns
+    -------
+    ndarray
+        The numbers, NaN and infinity among them.
+
+    Raises
+    ------
+    DataError
+        For text, complex numbers, and rows of different lengths.
+    """
+    try:
+        given = np.asarray(array)
+        numbers = given.real.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DataError(
+            f"{name} must be an array of numbers, all rows of the same length ({' '.join(str(error).split())})"
+        ) from None
+    if np.iscomplexobj(given):
+        raise DataError(f"{name} must be real numbers, and these are complex: give their parts as columns")
+    return numbers
+
+
 def check_finite(array: np.ndarray, name: str) -> None:
-    """Raise a `DataError` naming the first entry of `array` (samples first) that is NaN or infinite."""
+    """Check that no entry is NaN or infinite.
+
+    Parameters
+    ----------
+    array : ndarray of shape (N, ...)
+        Numbers, samples first.
+    name : str
+        What the array is, to begin the sentence of an error with.
+
+    Raises
+    ------
+    DataError
+        Which names the row and the column of the first entry that is not finite.
+    """
     finite = np.isfinite(array)
     if finite.all():
         return
@@ -37,49 +88,129 @@ def check_finite(array: np.ndarray, name: str) -> None:
     )
 
 
-def check_states(estimator, X, *, reset: bool = False) -> np.ndarray:
-    """States as an (N, n) float array; with `reset` the estimator learns n from them.
+def check_squarable(names: str, *arrays: np.ndarray) -> None:
+    """Check that the largest of some numbers has a square that double precision holds.
 
-    Raises `DataError` for anything that is not a finite two-dimensional array of the expected width.
+    Parameters
+    ----------
+    names : str
+        What the arrays are, as the subject of a sentence in the plural.
+    *arrays : ndarray
+        Finite numbers, all in one unit.
+
+    Raises
+    ------
+    DataError
+        If the square of the largest would be infinite, or zero though the number is not.
     """
-    with _one_sentence():
-        X = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
-    check_finite(X, "X")
-    return X
+    largest = max(float(np.abs(array).max(initial=0.0)) for array in arrays)
+    if largest and not 1 / SQUARABLE <= largest <= SQUARABLE:
+        raise DataError(
+            f"{names} reach {largest:.3g}, whose square double precision does not hold: give them in another unit"
+        )
 
 
-def check_samples(estimator, X, y, *, reset: bool, min_samples: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """States (N, n) and actions (N, d) or (N,) as finite float arrays of equal length.
+def check_states(estimator: "BaseEstimator", X: ArrayLike, *, reset: bool = False) -> np.ndarray:
+    """Check states for an estimator of scikit-learn's kind.
 
-    Raises `DataError` otherwise, and where there are fewer than `min_samples` samples.
+    Parameters
+    ----------
+    estimator : estimator
+        Whose `n_features_in_` the states have to match.
+    X : array_like of shape (N, n)
+        States.
+    reset : bool
+        Whether the estimator learns n from them.
+
+    Returns
+    -------
+    ndarray of shape (N, n)
+        The states, in double precision.
+
+    Raises
+    ------
+    DataError
+        For anything that is not a finite two-dimensional array of the expected width.
     """
+    from sklearn.utils.validation import validate_data
+
+    expected = None if reset else getattr(estimator, "n_features_in_", None)
+    with _one_sentence(lambda: _hint_at_states(X, expected)):
+        states = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
+    check_finite(states, "X")
+    _check_not_too_large("the states X", states)
+    return states
+
+
+def check_samples(
+    estimator: "BaseEstimator", X: ArrayLike, y: ArrayLike | None, *, reset: bool, min_samples: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Check states and actions for an estimator of scikit-learn's kind.
+
+    Parameters
+    ----------
+    estimator : estimator
+        Whose `n_features_in_` the states have to match.
+    X : array_like of shape (N, n)
+        States.
+    y : array_like of shape (N, d) or (N,)
+        Actions.
+    reset : bool
+        Whether the estimator learns n from them.
+    min_samples : int
+        How many samples it needs.
+
+    Returns
+    -------
+    X : ndarray of shape (N, n)
+        The states, in double precision.
+    y : ndarray of shape (N, d) or (N,)
+        The actions, in double precision.
+
+    Raises
+    ------
+    DataError
+        If either is not finite, lengths differ, there are too few samples, or squares would overflow.
+    """
+    from sklearn.utils.validation import check_array, check_consistent_length, validate_data
+
     if y is None:
         raise DataError(f"{type(estimator).__name__} requires y to be passed, but the target y is None")
-    with _one_sentence():
-        X = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
-        y = check_array(y, dtype=np.float64, ensure_2d=False, ensure_all_finite=False, input_name="y")
-        check_consistent_length(X, y)
-    check_finite(X, "X")
-    check_finite(y, "y (the actions)")
-    if len(X) < min_samples:
+    with _one_sentence(lambda: _hint_at_samples(X, y)):
+        states = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
+        actions = check_array(y, dtype=np.float64, ensure_2d=False, ensure_all_finite=False, input_name="y")
+        check_consistent_length(states, actions)
+    check_finite(states, "X")
+    check_finite(actions, "y (the actions)")
+    _check_not_too_large("the states X", states)
+    check_squarable("the actions y", actions)
+    if len(states) < min_samples:
         raise DataError(
-            f"one sample (n_samples = {len(X)}) is not enough: a policy needs {min_samples} or more"
+            f"one sample (n_samples = {len(states)}) is not enough: a policy needs {min_samples} or more"
         )
-    return X, y
+    return states, actions
 
 
-def check_numbers(array, name: str) -> np.ndarray:
-    """Make an array of float64, of any shape. Raises `DataError` for text, and for rows of different lengths."""
-    try:
-        return np.asarray(array, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise DataError(
-            f"{name} must be an array of numbers, all rows of the same length ({' '.join(str(error).split())})"
-        ) from None
+def check_actions(U: ArrayLike, name: str = "actions") -> np.ndarray:
+    """Check actions.
 
+    Parameters
+    ----------
+    U : array_like of shape (N, d) or (N,)
+        Actions; (N,) is read as d = 1.
+    name : str
+        What they are, to begin the sentence of an error with.
 
-def check_actions(U, name: str = "actions") -> np.ndarray:
-    """Actions as an (N, d) finite float array; (N,) is read as d = 1. Raises `DataError` otherwise."""
+    Returns
+    -------
+    ndarray of shape (N, d)
+        The actions, in double precision.
+
+    Raises
+    ------
+    DataError
+        If they are of another shape or not finite.
+    """
     U = check_numbers(U, name)
     if U.ndim == 1:
         U = U[:, None]
@@ -89,10 +220,29 @@ def check_actions(U, name: str = "actions") -> np.ndarray:
     return U
 
 
-def check_projections(projections, n_samples: int, n_actions: int, *, unknown: bool = False) -> np.ndarray:
-    """Nullspace projections as an (N, d, d) finite float array. Raises `DataError` otherwise.
+def check_projections(
+    projections: ArrayLike, n_samples: int, n_actions: int, *, unknown: bool = False
+) -> np.ndarray:
+    """Check nullspace projections.
 
-    With `unknown`, those that are not known may be NaN, as a whole.
+    Parameters
+    ----------
+    projections : array_like of shape (N, d, d)
+        One matrix a sample.
+    n_samples, n_actions : int
+        N and d.
+    unknown : bool
+        Whether a projection may be all NaN, for one that is not known.
+
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        The projections, in double precision.
+
+    Raises
+    ------
+    DataError
+        If they are of another shape or not finite, or one is no projection.
     """
     N = check_numbers(projections, "projections")
     if N.shape != (n_samples, n_actions, n_actions):
@@ -100,13 +250,12 @@ def check_projections(projections, n_samples: int, n_actions: int, *, unknown: b
             f"projections must have shape {(n_samples, n_actions, n_actions)}, one d x d matrix a sample, "
             f"got {N.shape}"
         )
-    flat = N.reshape(n_samples, -1)
-    if not unknown and np.isnan(flat).all(axis=1).any():
+    missing = np.isnan(N).reshape(n_samples, -1).all(axis=1)
+    if not unknown and missing.any():
         raise DataError(
-            f"the projection of row {np.argmax(np.isnan(flat).all(axis=1))} is NaN, that is, not known: "
-            'leave such samples out, or choose risk="auto", which does without'
+            f"the projection of row {np.argmax(missing)} is NaN, that is, not known: leave such samples out"
         )
-    check_finite(np.where(np.isnan(flat).all(axis=1, keepdims=True), 0.0, flat), "projections")
+    check_finite(np.where(missing[:, None, None], 0.0, N), "projections")
     odd = not_idempotent(N)
     if len(odd):
         raise DataError(f"the projection of row {odd[0]} {NOT_IDEMPOTENT}")
@@ -114,9 +263,17 @@ def check_projections(projections, n_samples: int, n_actions: int, *, unknown: b
 
 
 def not_idempotent(projections: np.ndarray) -> np.ndarray:
-    """Rows of the matrices N (N, d, d) that are no projections, as `N N v` is not `N v` for a v that favours no axis.
+    """Find the matrices that are no projections, as `N N v` is not `N v` for a v that favours no axis.
 
-    Generous, so that projections rounded to two decimals pass; those that are NaN pass too.
+    Parameters
+    ----------
+    projections : ndarray of shape (N, d, d)
+        Matrices; those that are NaN pass, and so do projections rounded to two decimals.
+
+    Returns
+    -------
+    ndarray of int
+        Their rows.
     """
     v = np.cos(np.arange(projections.shape[2]) + 1.0)
     with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are far from any projection's
@@ -126,58 +283,161 @@ def not_idempotent(projections: np.ndarray) -> np.ndarray:
     return np.flatnonzero(~same & ~np.isnan(projections).any(axis=(1, 2)))
 
 
-def check_weights(sample_weight, X: np.ndarray) -> np.ndarray:
-    """Sample weights (N,), ones where none are given. Raises `DataError` for a negative one, or none left."""
+def check_weights(sample_weight: ArrayLike | None, X: np.ndarray) -> np.ndarray:
+    """Check sample weights.
+
+    Parameters
+    ----------
+    sample_weight : array_like of shape (N,), float, or None
+        Weights of the samples; None is one for each.
+    X : ndarray of shape (N, ...)
+        The samples.
+
+    Returns
+    -------
+    ndarray of shape (N,)
+        The weights, in double precision.
+
+    Raises
+    ------
+    DataError
+        If one is negative, all are zero, or they are too large to be added.
+    """
+    from sklearn.utils.validation import _check_sample_weight
+
     with _one_sentence():
         weights = _check_sample_weight(sample_weight, X, dtype=np.float64, ensure_non_negative=True)
     if not weights.any():
         raise DataError("every sample weight is zero: nothing is left to learn from")
+    check_squarable("the sample weights", weights)
     return weights
 
 
-def check_groups(groups, n_samples: int) -> np.ndarray | None:
-    """Episode labels (N,), or None. Raises `DataError` where there is not one label a sample."""
+def check_groups(groups: ArrayLike | None, n_samples: int) -> np.ndarray | None:
+    """Check episode labels.
+
+    Parameters
+    ----------
+    groups : array_like of shape (N,), or None
+        A label a sample, numbers or text.
+    n_samples : int
+        N.
+
+    Returns
+    -------
+    ndarray of shape (N,), or None
+        The labels; None where none are given.
+
+    Raises
+    ------
+    DataError
+        If there is not one label a sample.
+    """
     if groups is None:
         return None
-    groups = np.asarray(groups)
-    if groups.shape != (n_samples,):
+    labels = np.asarray(groups)
+    if labels.shape != (n_samples,):
         raise DataError(
-            f"groups must hold one episode label a sample, {n_samples} in all, got shape {groups.shape}"
+            f"groups must hold one episode label a sample, {n_samples} in all, got shape {labels.shape}"
         )
-    if groups.dtype.kind == "f" and np.isnan(groups).any():
+    if labels.dtype.kind == "f" and np.isnan(labels).any():
         raise DataError(
-            f"groups contains NaN in row {np.argmax(np.isnan(groups))}: give every sample the label of an episode"
+            f"groups contains NaN in row {np.argmax(np.isnan(labels))}: give every sample the label of an episode"
         )
-    return groups
+    return labels
 
 
-def check_number(value, name: str, *, positive: bool) -> float:
-    """Check for a finite number, above zero where `positive`, else at least zero. Raises `PolicyError` otherwise."""
+def check_number(value: object, name: str, *, positive: bool) -> float:
+    """Check an option that is a finite number.
+
+    Parameters
+    ----------
+    value : object
+        What was given.
+    name : str
+        Of the option.
+    positive : bool
+        Whether it has to be above zero; else zero will do.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    PolicyError
+        If it is not such a number.
+    """
     wanted = "above zero" if positive else "of at least zero"
     try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise PolicyError(f"{name} must be a number {wanted}, got {value!r}") from None
+        number = float(value)  # type: ignore[arg-type]  # anything else is what is caught
+    except (TypeError, ValueError, OverflowError):
+        raise PolicyError(f"{name} must be a number {wanted}, got {value!r:.60}") from None
     if not np.isfinite(number) or number < 0 or (positive and number == 0):
-        raise PolicyError(f"{name} must be a finite number {wanted}, got {value!r}")
+        raise PolicyError(f"{name} must be a finite number {wanted}, got {value!r:.60}")
     return number
 
 
-def check_choice(value, name: str, choices: tuple[str, ...]) -> str:
-    """One of the named choices. Raises `PolicyError` that lists them otherwise."""
+def check_choice(value: object, name: str, choices: tuple[str, ...]) -> str:
+    """Check an option that is one of several names.
+
+    Parameters
+    ----------
+    value : object
+        What was given.
+    name : str
+        Of the option.
+    choices : tuple of str
+        What may be given.
+
+    Returns
+    -------
+    str
+        The choice.
+
+    Raises
+    ------
+    PolicyError
+        Which lists the choices, if it is none of them.
+    """
     if not isinstance(value, str) or value not in choices:
-        raise PolicyError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+        raise PolicyError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r:.60}")
     return value
 
 
-class _one_sentence:
-    """scikit-learn's ValueErrors, on their way out, become one `DataError` sentence."""
+def _check_not_too_large(names: str, array: np.ndarray) -> None:
+    # States close to zero are no mistake: nothing is learnt from how long a state is.
+    if np.abs(array).max(initial=0.0) > SQUARABLE:
+        check_squarable(names, array)
 
-    def __enter__(self) -> None:
-        return None
 
-    def __exit__(self, kind, error, traceback) -> None:
-        if isinstance(error, ValueError) and not isinstance(error, DataError):
-            # Some of scikit-learn's messages print the whole array between their two sentences.
-            text = re.sub(r":\narray=.*?\n(?=Reshape)", ": ", str(error), flags=re.DOTALL)
-            raise DataError(" ".join(text.split())) from None
+def _hint_at_samples(X: ArrayLike, y: ArrayLike) -> str:
+    """Say so where states have a column, and not a row, for each of the actions."""
+    shape, length = np.shape(X), np.shape(y)[:1]
+    if len(shape) == 2 and shape[0] != shape[1] and shape[1:] == length:
+        return f"; X has shape {shape} and y has {shape[1]} samples: did you mean the transpose, X.T?"
+    return ""
+
+
+def _hint_at_states(X: ArrayLike, expected: int | None) -> str:
+    """Say so where states have a row, and not a column, for each state that is expected."""
+    shape = np.shape(X)
+    if len(shape) == 2 and shape[1] != shape[0] == expected:
+        return f"; X has shape {shape}: did you mean the transpose, X.T?"
+    return ""
+
+
+@contextmanager
+def _one_sentence(hint: Callable[[], str] = str) -> Iterator[None]:
+    """Turn scikit-learn's ValueErrors into one `DataError` sentence, with a hint at its end."""
+    try:
+        yield
+    except DataError:
+        raise
+    except ValueError as error:
+        # Some of scikit-learn's messages print the whole array between their two sentences.
+        text = re.sub(r":\narray=.*?\n(?=Reshape)", ": ", str(error), flags=re.DOTALL)
+        with suppress(ValueError):  # rows of different lengths have no shape
+            text += hint()
+        raise DataError(" ".join(text.split())) from None

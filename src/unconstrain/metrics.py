@@ -25,9 +25,9 @@ Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import check_actions, check_projections
+from unconstrain.arrays import SQUARABLE, check_actions, check_projections, check_squarable
 from unconstrain.errors import DataError
-from unconstrain.motion import SQUARABLE, directions
+from unconstrain.motion import directions
 
 __all__ = [
     "constrained_policy_error",
@@ -181,7 +181,7 @@ def projected_policy_error(Pi: ArrayLike, N: ArrayLike, learnt: ArrayLike) -> fl
     Lin, Howard, Vijayakumar, "Learning null space projections", ICRA 2015.
     """
     Pi = check_actions(Pi, "the true policy")
-    _check_squarable("the true policy's actions", Pi)
+    check_squarable("the true policy's actions", Pi)
     N, learnt = check_projections(N, *Pi.shape), check_projections(learnt, *Pi.shape)
     return float(np.mean(_squares(np.einsum("nij,nj->ni", N - learnt, Pi))))
 
@@ -211,7 +211,7 @@ def projected_observation_error(U: ArrayLike, learnt: ArrayLike) -> float:
     Lin, Howard, Vijayakumar, "Learning null space projections", ICRA 2015.
     """
     U = check_actions(U)
-    _check_squarable("actions", U)
+    check_squarable("actions", U)
     learnt = check_projections(learnt, *U.shape)
     return float(np.mean(_squares(U - np.einsum("nij,nj->ni", learnt, U))))
 
@@ -237,7 +237,7 @@ def normalized(error: float, Pi: ArrayLike) -> float:
         If the policy does not vary.
     """
     Pi = check_actions(Pi, "the true policy")
-    _check_squarable("the true policy's actions", Pi)
+    check_squarable("the true policy's actions", Pi)
     variance = float(np.sum(np.var(Pi, axis=0)))
     if variance == 0.0:
         raise DataError(
@@ -287,7 +287,7 @@ def _squares(E: np.ndarray) -> np.ndarray:
 def _check_pair(A: ArrayLike, B: ArrayLike, name_a: str, name_b: str) -> tuple[np.ndarray, np.ndarray]:
     """Check two arrays (N, d) that are compared in squared units."""
     A, B = _check_shapes(A, B, name_a, name_b)
-    _check_squarable(f"{name_a} and {name_b}", A, B)
+    check_squarable(f"{name_a} and {name_b}", A, B)
     return A, B
 
 
@@ -298,11 +298,3 @@ def _check_shapes(A: ArrayLike, B: ArrayLike, name_a: str, name_b: str) -> tuple
     if not len(A):
         raise DataError("no samples: a mean error needs at least one")
     return A, B
-
-
-def _check_squarable(names: str, *arrays: np.ndarray) -> None:
-    largest = max(float(np.abs(A).max(initial=0.0)) for A in arrays)
-    if largest and not 1 / SQUARABLE <= largest <= SQUARABLE:
-        raise DataError(
-            f"{names} reach {largest:.3g}, whose square double precision does not hold: give them in another unit"
-        )

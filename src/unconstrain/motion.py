@@ -2,15 +2,14 @@
 
 import numpy as np
 
+from unconstrain.arrays import SQUARABLE
+
 NO_MOTION = 1e-12
 """Share of the longest action below which an action is at rest.
 
 So short an action is the rounding that a projection leaves where it blocks all motion: its direction is noise, and a
 policy would learn it as truth.
 """
-
-SQUARABLE = 1e150
-"""Numbers between the inverse of this and this can be squared and summed in double precision."""
 
 
 def lengths(U: np.ndarray) -> np.ndarray:

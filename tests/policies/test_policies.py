@@ -253,7 +253,7 @@ X, U = np.eye(4)[:, :2], np.ones((4, 2))
         ),
         (
             lambda: uc.ParametricPolicy(risk="constrained").fit(X, U, projections=np.full((4, 2, 2), np.nan)),
-            'row 0 is NaN, that is, not known: .* risk="auto"',
+            "row 0 is NaN, that is, not known: leave such samples out",
         ),
         (lambda: uc.ParametricPolicy(alpha="cv").fit(X, U, groups=[1] * 4), "at least two episodes"),
         (lambda: uc.ParametricPolicy().fit(X, U, groups=[1]), "one episode label a sample"),

@@ -1,0 +1,28 @@
+"""Receptive fields are right however wide or narrow they are, and however far the states."""
+
+import numpy as np
+import pytest
+
+from unconstrain.receptive import activations, normalized_activations
+
+X, C = np.random.default_rng(0).normal(size=(20, 3)), np.random.default_rng(1).normal(size=(5, 3))
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1.0, 1e100])
+def test_only_the_ratio_of_distance_to_width_matters(scale):
+    for f in (activations, normalized_activations):
+        np.testing.assert_allclose(f(scale * X, scale * C, scale * 0.7), f(X, C, 0.7), rtol=1e-9)
+
+
+@pytest.mark.parametrize("width", [5e-324, 1e-200])
+def test_the_narrowest_field_is_active_at_its_centre_only(width):
+    np.testing.assert_array_equal(activations(C, C, width), np.eye(5))
+    np.testing.assert_array_equal(normalized_activations(C, C, width), np.eye(5))
+
+
+def test_the_widest_field_is_active_everywhere():
+    np.testing.assert_array_equal(activations(X, C, 1e300), np.ones((20, 5)))
+
+
+def test_far_from_all_centres_the_nearest_is_left():
+    np.testing.assert_allclose(normalized_activations(1e20 * X, C, 1.0).sum(axis=1), 1.0)

@@ -82,6 +82,7 @@ def test_public_names_are_documented_in_full(name):
     assert faults(name) == []
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if not f"{name}.".startswith(UNFINISHED)])
+@pytest.mark.parametrize("module", MODULES)
 def test_no_docstring_speaks_of_parameters_that_are_not_there(module):
-    assert {name: wrong for name in described(module) if (wrong := faults(name, UNTRUE))} == {}
+    finished = [name for name in described(module) if not name.startswith(UNFINISHED)]
+    assert {name: wrong for name in finished if (wrong := faults(name, UNTRUE))} == {}

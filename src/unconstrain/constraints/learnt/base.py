@@ -169,7 +169,7 @@ class LearntConstraint(BaseEstimator, ABC):
 
         Parameters
         ----------
-        path : path
+        path : path-like
             Customarily it ends in ``.skops``. An existing file is replaced.
 
         Raises
@@ -248,8 +248,9 @@ def load_constraint(path: str | Path, *, trusted: Iterable[Any] = ()) -> LearntC
 
     Parameters
     ----------
-    path : path
-    trusted : classes and functions, optional
+    path : path-like
+        The file.
+    trusted : iterable of classes and functions, optional
         Those of your own that the constraint holds, such as a task Jacobian. The file has only their names, so give
         the classes and functions themselves.
 

@@ -59,7 +59,7 @@ class FeatureConstraint(LearntConstraint):
         Number k of rows. None reads it off the shares of motion, as `ConstantConstraint` does, which needs actions
         that differ at like states: features flexible enough make any one movement look constrained but along itself.
     alpha : float or "cv"
-        ρ, the weight on rows of even length (see Notes); "cv" chooses it by held-out episodes.
+        Weight ρ on rows of even length (see Notes); "cv" chooses it by held-out episodes.
 
     Attributes
     ----------

@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 .PHONY: demo test bench format clean
 
 demo: $(VENV)/.demo
-	$(BIN)/unconstrain demo --out out/demo
+	$(BIN)/unconstrain demo --out out/demo --overwrite
 
 test: $(VENV)/.test
 	$(BIN)/ruff check .

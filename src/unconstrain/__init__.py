@@ -8,9 +8,9 @@ Everything below is imported when it is first used, so that importing the packag
 >>> policy.fit(demos)                                                               # doctest: +SKIP
 """
 
-from typing import TYPE_CHECKING
-
 from unconstrain import lazy
+
+TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
     from unconstrain import constraints, errors, features, metrics, plot, robots

@@ -184,6 +184,32 @@ class Demonstrations:
         place[order] = np.arange(len(self)) - np.repeat(starts, sizes)
         return self.episodes * k + k * place // sizes[self.episodes]
 
+    def folds(self, kind: str | None = None, n_blocks: int = 5) -> Codes:
+        """Labels (N,) of what is held out together in cross-validation, to be passed as `groups=`.
+
+        Parameters
+        ----------
+        kind : {"episodes", "blocks"}, optional
+            Whole episodes, or contiguous blocks of each. By default episodes, if there are several.
+        n_blocks : int
+            Blocks in each episode.
+
+        Raises
+        ------
+        DataError
+            `kind` is unknown, or there is a single episode where episodes are to be held out.
+        """
+        kind = kind or ("episodes" if self.n_episodes > 1 else "blocks")
+        if kind not in ("episodes", "blocks"):
+            raise DataError(f"folds must be episodes or blocks, got {kind!r}")
+        if kind == "blocks":
+            return self.blocks(n_blocks)
+        if self.n_episodes < 2:
+            raise DataError(
+                "there is one episode, and none is left when it is held out: use blocks instead of episodes for folds="
+            )
+        return self.episodes
+
     def moving(self, min_speed: float) -> "Demonstrations":
         """Only the samples with ‖u‖ ≥ `min_speed` (units of the actions), and a note of how many went.
 

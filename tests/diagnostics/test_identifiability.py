@@ -5,13 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.preprocessing import SplineTransformer
-from typer.testing import CliRunner
 
 import unconstrain as uc
 from reproduction.plants import arm
 from tests.problems import problems
 from unconstrain import limit_cycle as toy
-from unconstrain.cli.app import app
 from unconstrain.diagnostics.information import of_recordings
 from unconstrain.diagnostics.spectrum import directions
 from unconstrain.fitting.posterior import Unsure
@@ -213,32 +211,32 @@ def test_the_report_speaks_in_the_users_words():
     assert report.determined_share_of_models.shape == (3,)
 
 
-def test_diagnose_warns_says_and_stops(tmp_path):
+def test_diagnose_warns_says_and_stops(run, tmp_path):
     """`fit` warns, `diagnose` says where and what next and draws it, `rollout` ends where nothing is known."""
     demos = toy.demonstrate(4, random_state=0)
     recording, saved = str(tmp_path / "toy.npz"), str(tmp_path / "toy.skops")
     uc.save(demos, recording)
     model = ["--model", "rbf", "--width", "0.3", "--centers", "grid", "--alpha", "1e-6"]
-    fit = CliRunner().invoke(app, ["fit", recording, *model, "--out", saved])
-    assert "is not determined by these recordings; `unconstrain diagnose`" in fit.output
+    _, out, _ = run("fit", recording, *model, "--out", saved)
+    assert "is not determined by these recordings; `unconstrain diagnose`" in out
     picture = tmp_path / "known.png"
-    told = CliRunner().invoke(app, ["diagnose", recording, *model, "--figure", str(picture)])
-    assert told.exit_code == 0
+    code, told, err = run("diagnose", recording, *model, "--figure", picture)
+    assert code == 0, err
     assert picture.stat().st_size > 0
     for part in ("determined: ", "least known:", "at x1 = ", "record next:", "  3. Start at "):
-        assert part in told.output
+        assert part in told
     everywhere = toy.demonstrate(40, random_state=0)
     left = everywhere.select(everywhere.states[:, 0] < 0)
     policy = uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.5)).fit(left.states, left.actions)
     policy.save(saved, resumable=True)
     move = ["rollout", saved, "--start=-0.7,0", "--steps", "400"]  # the cycle leads to the right
     paths = ["--out", str(tmp_path / "path.csv"), "--figure", str(tmp_path / "path.png")]
-    stopped = CliRunner().invoke(app, [*move, *paths, "--stop-when-unsure", "0.3"])
-    assert "of 400 steps: the policy is known to within ±" in stopped.output
+    _, stopped, _ = run(*move, *paths, "--stop-when-unsure", "0.3")
+    assert "of 400 steps: the policy is known to within ±" in stopped
     assert Unsure(policy, 0.3)(np.array([[-0.7, 0.0], [0.7, 0.0]])).tolist() == [False, True]
-    refused = CliRunner().invoke(app, [*move, *paths, "--stop-when-unsure", "1e-9"])
-    assert isinstance(refused.exception, uc.errors.UnconstrainError)
-    assert "at the start already" in str(refused.exception)
+    code, _, refused = run(*move, *paths, "--overwrite", "--stop-when-unsure", "1e-9")
+    assert code == 2
+    assert "at the start already" in refused
 
 
 X = np.random.default_rng(0).normal(size=(20, 2))

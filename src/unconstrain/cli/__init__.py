@@ -1,5 +1,22 @@
 """The command line: one file a command, and what several of them share."""
 
-from unconstrain.cli.app import main
+import sys
+
+
+def main() -> None:
+    """Run the program, and end with its exit code: 0, 2 after a user's mistake, 130 after Ctrl-C."""
+    try:
+        from unconstrain.cli.app import run  # here, because Ctrl-C may come while it is imported
+
+        code = run()
+    except KeyboardInterrupt as stop:
+        said = f"{stop}; " if str(stop) else "interrupted: "
+        print(f"{said}nothing was left half written", file=sys.stderr)
+        exec(
+            ""
+        )  # Python kills itself at its end if an interrupt passed through `exec`, unless one ends well later
+        code = 130
+    sys.exit(code)
+
 
 __all__ = ["main"]

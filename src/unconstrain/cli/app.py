@@ -1,65 +1,87 @@
-"""The program: its commands, and how it ends when something is wrong."""
+"""The program: its commands, and how it ends."""
 
-import sys
-from typing import Annotated
+from collections.abc import Sequence
 
-import typer
-from rich.console import Console
+import click
 
 import unconstrain
 from unconstrain.cli import reporting
+from unconstrain.cli.command import Group, Interrupted
 from unconstrain.cli.constraints import constraints
 from unconstrain.cli.demo import demo
 from unconstrain.cli.diagnose import diagnose
 from unconstrain.cli.evaluate import evaluate
 from unconstrain.cli.fit import fit
 from unconstrain.cli.rollout import rollout
-from unconstrain.errors import UnconstrainError
 
-app = typer.Typer(
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode="markdown",
-    pretty_exceptions_enable=False,
-    help="Learn the policy behind constrained demonstrations.",
-)
+WIDTH = 100
+"""Of the help, in columns, where the terminal has as many."""
 
 
-def _version(asked: bool) -> None:
+def _print_version(context: click.Context, option: click.Parameter, asked: bool) -> None:
     if asked:
-        print(unconstrain.__version__)
-        raise typer.Exit
+        reporting.say(unconstrain.__version__)
+        context.exit()
 
 
-@app.callback()
-def program(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
+@click.group(cls=Group, context_settings={"max_content_width": WIDTH, "help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version.",
+)
+def program() -> None:
     """Learn the policy behind constrained demonstrations."""
 
 
 for command in (demo, fit, evaluate, diagnose, constraints, rollout):
-    app.command()(command)
+    program.add_command(command)
 
 
-def main() -> None:
-    """Run the program. A user's mistake is one sentence on stderr and exit code 2; Ctrl-C is exit code 130."""
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the program with the arguments given, or those of the process.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What follows the program's name.
+
+    Returns
+    -------
+    int
+        The exit code: 0, 1 if standard output could not be written, or 2 after a mistake of the user's.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The user pressed Ctrl-C.
+    """
+    with reporting.forgiving_output() as output:
+        code = _run(arguments)
+        output.flush()
+    if output.failure is None:
+        return code
+    reporting.say_error(
+        f"standard output could not be written ({output.failure}), so not all was said; all files were written"
+    )
+    return code or 1
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
-        app()
-    except UnconstrainError as error:
-        Console(stderr=True).print(
-            f"[bold red]error:[/] {_plain(str(error))}", soft_wrap=True, highlight=False
-        )
-        sys.exit(2)
-    except SystemExit as end:
-        if end.code == reporting.INTERRUPTED:  # typer turns Ctrl-C into this without a word
-            print("interrupted: nothing was left half written", file=sys.stderr)
-        raise
-    except BrokenPipeError:
-        sys.exit(1)
-
-
-def _plain(text: str) -> str:
-    return text.replace("[", r"\[")
+        # A command returns nothing; click returns the code that `Context.exit` was given.
+        return program.main(arguments, prog_name="unconstrain", standalone_mode=False) or 0
+    except Interrupted as stop:
+        raise KeyboardInterrupt(stop.message) from None
+    except click.UsageError as error:
+        hint = None if error.ctx is None else f"see {error.ctx.command_path} --help"
+        reporting.say_error(error.format_message(), hint)
+        return error.exit_code
+    except click.ClickException as error:
+        reporting.say_error(error.format_message())
+        return error.exit_code
+    except click.Abort:  # what click makes of Ctrl-C before the command begins
+        raise KeyboardInterrupt from None

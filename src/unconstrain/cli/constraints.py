@@ -1,88 +1,85 @@
 """`unconstrain constraints`: the directions in which recordings never move, and how sure that is."""
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+import click
 
-from unconstrain import metrics as risk
-from unconstrain import plot
-from unconstrain.arrays import check_choice
-from unconstrain.cli import recordings, reporting
-from unconstrain.constraints.learnt import ConstantConstraint, FeatureConstraint
-from unconstrain.constraints.learnt.base import LearntConstraint, held_out_projections
+from unconstrain.cli import outputs, recordings, reporting
+from unconstrain.cli.command import command
 from unconstrain.errors import PolicyError
-from unconstrain.features import NormalizedRBF
+from unconstrain.progress import working
 
 MODELS = ("constant", "linear", "rbf")
-
-Model = Annotated[
-    str,
-    typer.Option("--model", help="constant; or rows that vary with the state: linear, rbf."),
-]
-Rows = Annotated[
-    int | None, typer.Option("--rows", help="How many rows; by default as the motion tells (constant), or 1.")
-]
-NCenters = Annotated[int | None, typer.Option("--n-centers", help="How many RBFs (10).")]
-Out = Annotated[Path, typer.Option("--out", help="Where the constraint is saved.")]
-Figure = Annotated[
-    Path | None, typer.Option("--figure", help="Draw shares of motion and rows (PNG, SVG, PDF).")
-]
+N_CENTERS = 10
 
 
+@command(
+    short_help="Find the constraint that recordings moved under.",
+    epilog="For example:\n\n\b\nunconstrain constraints wipe.csv --state x,y,z --time t --out table.skops",
+)
+@recordings.recorded
+@click.option(
+    "--model",
+    type=click.Choice(MODELS),
+    default="constant",
+    show_default=True,
+    help="constant rows, or rows that vary with the state: linear, rbf.",
+)
+@click.option(
+    "--rows",
+    type=click.IntRange(min=1),
+    metavar="NUMBER",
+    help="How many rows; by default as many as the motion tells (constant), or 1.",
+)
+@click.option(
+    "--n-centers",
+    type=click.IntRange(min=1),
+    metavar="NUMBER",
+    help=f"How many RBFs; {N_CENTERS} by default.",
+)
+@outputs.out("constraint.skops", "Where the constraint is saved.")
+@outputs.figure("Draw shares of motion and rows")
+@outputs.overwrite
 def constraints(
-    context: typer.Context,
-    files: recordings.Files,
-    state: recordings.State = None,
-    action: recordings.Action = None,
-    time: recordings.Time = None,
-    episode: recordings.Episode = None,
-    model: Model = "constant",
-    rows: Rows = None,
-    n_centers: NCenters = None,
-    out: Out = Path("constraint.skops"),
-    figure: Figure = None,
-    time_unit: recordings.TimeUnit = None,
-    window: recordings.Window = None,
-    gap: recordings.Gap = None,
-    max_speed: recordings.MaxSpeed = None,
-    min_speed: recordings.MinSpeed = None,
-    min_duration: recordings.MinDuration = None,
+    recorded: recordings.Recorded,
+    model: str,
+    rows: int | None,
+    n_centers: int | None,
+    out: Path,
+    figure: Path | None,
+    overwrite: bool,
 ) -> None:
-    """Find the constraint that recordings moved under: rows A with A u = 0.
-
-    `unconstrain constraints wipe.csv --state x,y,z --time t --out table.skops`
-    """
-    recordings.check_writable(out, figure)
-    plot.check_suffix(figure)
-    check_choice(model, "--model", MODELS)
+    """Find the constraint that recordings moved under: rows A with A u = 0."""
+    outputs.check_outputs(recorded.files, {"out": out, "figure": figure}, overwrite=overwrite)
     if n_centers is not None and model != "rbf":
-        raise PolicyError(f"--n-centers is for --model rbf, and this is {model}")
-    how = recordings.asked(context.params)
-    estimator = _estimator(model, rows, 10 if n_centers is None else n_centers)
-    console = reporting.console()
-    with console.status("reading"):
-        demos = recordings.read(files, how)
-    recordings.describe(console, demos)
-    groups = recordings.folds_of(demos, None)
-    with console.status("fitting"):
-        learnt = estimator.fit(demos.states, demos.actions, groups=groups)
-        N = held_out_projections(estimator, demos.states, demos.actions, groups)
-    console.print(learnt.describe(demos.states, demos.action_names), markup=False)
-    error = risk.normalized(risk.projected_observation_error(demos.actions, N), demos.actions)
-    console.print(
-        f"motion across the constraint, on what was held out: {error:.2%} of the actions' variance (nPOE)"
-    )
+        raise PolicyError(f"n_centers= is for --model rbf, and this is {model}")
+    from unconstrain import metrics, plot
+    from unconstrain.constraints.learnt import ConstantConstraint, FeatureConstraint
+    from unconstrain.constraints.learnt.base import held_out_projections
+    from unconstrain.features import NormalizedRBF
+
+    if model == "constant":
+        estimator = ConstantConstraint(rows)
+    else:
+        features = NormalizedRBF(n_centers or N_CENTERS) if model == "rbf" else None
+        estimator = FeatureConstraint(features, rows or 1)
+    with working("reading"):
+        demos = recorded.load()
+    recordings.describe(demos)
+    data, groups = (demos.states, demos.actions), demos.folds()
+    with working("fitting"):
+        learnt = estimator.fit(*data, groups=groups)
+        error = metrics.projected_observation_error(
+            demos.actions, held_out_projections(estimator, *data, groups)
+        )
+    learnt.save(out)
     if figure is not None:
         plot.save(plot.constraint_figure(learnt, demos), figure)
-        console.print(f"figure: {figure}")
-    learnt.save(out)
-    console.print(f"constraint: {out}")
-
-
-def _estimator(model: str, rows: int | None, n_centers: int) -> LearntConstraint:
-    if model == "constant":
-        return ConstantConstraint(rows)
-    return FeatureConstraint(
-        NormalizedRBF(n_centers) if model == "rbf" else None, 1 if rows is None else rows
+    reporting.say(learnt.describe(demos.states, demos.action_names))
+    reporting.say(
+        "motion across the constraint, on what was held out: "
+        f"{metrics.normalized(error, demos.actions):.2%} of the actions' variance (nPOE)"
     )
+    if figure is not None:
+        reporting.say(f"figure: {figure}")
+    reporting.say(f"constraint: {out}")

@@ -2,78 +2,69 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.csv
-import typer
-from rich.table import Table
+import click
 
-from unconstrain import atomic, metrics, plot
-from unconstrain import demo as experiment
-from unconstrain.cli import reporting
-from unconstrain.cli.reporting import quoted
-from unconstrain.demonstrations import Demonstrations
+from unconstrain import atomic
+from unconstrain.cli import outputs, reporting
+from unconstrain.cli.command import command
 from unconstrain.errors import UnconstrainError
+from unconstrain.progress import working
 
-ROWS = {
+WAYS = {
     "inconsistency": "the policy behind them (inconsistency)",
     "direct": "ordinary regression (direct)",
     "oracle": "shown the true policy itself (oracle)",
 }
+COLUMNS = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explained")
 
 
-def demo(
-    out: Annotated[
-        Path, typer.Option("--out", help="Folder for the picture, the table and the data.")
-    ] = Path("unconstrain-demo"),
-) -> None:
+@command(short_help="Learn from simulated movements, and draw it.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default="unconstrain-demo",
+    show_default=True,
+    help="Folder for the picture, the table and the data.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in that folder.")
+def demo(out: Path, overwrite: bool) -> None:
     """Simulate 40 constrained movements, learn the policy behind them, draw it."""
-    console = reporting.console()
+    picture, table, data = out / "limit-cycle.png", out / "table.md", out / "movements.csv"
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UnconstrainError(f"cannot make the folder {out}: {error.strerror}") from error
-    with console.status("40 movements around a limit cycle, each bent by three unknown constraints"):
+    for path in (picture, table, data):
+        outputs.check_new(path, "out", overwrite=overwrite)
+    from unconstrain import demo as experiment
+    from unconstrain import metrics, plot
+    from unconstrain.recordings.text import write_csv
+
+    rows = []
+    with working("40 movements around a limit cycle, each bent by three unknown constraints"):
         training, test = experiment.draw_data(0)
-        rows = []
-        for kind, name in ROWS.items():
-            policy = experiment.learn(training, kind)
+        for way, name in WAYS.items():
+            policy = experiment.learn(training, way)
             errors = experiment.measure_errors(policy, test)
             share = metrics.explained(test.actions, policy.predict(test.states))
             rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}", f"{share:.2%}"))
-        picture = plot.save(experiment.plot_fields(), out / "limit-cycle.png")
-        _write_csv(training, out / "movements.csv")
-    columns = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explained")
-    _write_markdown(columns, rows, out / "table.md")
-    table = Table(*columns, title="40 other movements, held out")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
-    console.print(
+        plot.save(experiment.plot_fields(), picture)
+        write_csv(training, data)
+        _write_markdown(COLUMNS, rows, table)
+    reporting.say_table(COLUMNS, rows, title="40 other movements, held out")
+    reporting.say(
         "nUPE, nCPE: squared error without and with constraints, as a share of the policy's variance"
     )
-    console.print(f"picture: {picture}\ntable: {out / 'table.md'}\ndata: {out / 'movements.csv'}")
-    console.print("\nnext, the same from a file (put your own in its place):")
-    console.print(
-        f"  unconstrain fit {quoted(out / 'movements.csv')} --state x1,x2 --action u1,u2 --episode episode --model rbf "
-        f"--out {quoted(out / 'policy.skops')}",
+    reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}")
+    reporting.say("\nnext, the same from a file (put your own in its place):")
+    reporting.say(
+        f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --episode episode --model rbf "
+        f"--out {reporting.shell_word(out / 'policy.skops')} --overwrite"
     )
 
 
-def _write_csv(demos: Demonstrations, path: Path) -> None:
-    """What a recording would hold: no true policy, no projections."""
-    columns = {"episode": demos.episodes, "t": demos.time}
-    columns |= {name: demos.states[:, i] for i, name in enumerate(demos.state_names)}
-    columns |= {name: demos.actions[:, i] for i, name in enumerate(demos.action_names)}
-    with atomic.replacing(path) as temporary:
-        pyarrow.csv.write_csv(
-            pa.table({name: np.asarray(values) for name, values in columns.items()}), temporary
-        )
-
-
-def _write_markdown(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]], path: Path) -> None:
+def _write_markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], path: Path) -> None:
     lines = [columns, ("---",) * len(columns), *rows]
     with atomic.replacing(path) as temporary:
         temporary.write_text("\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n", encoding="utf-8")

@@ -1,63 +1,55 @@
 """`unconstrain evaluate`: a policy against recordings it has not seen."""
 
 from pathlib import Path
-from typing import Annotated
 
-import numpy as np
-import typer
-from rich.table import Table
+import click
 
-from unconstrain import metrics as risk
 from unconstrain.cli import recordings, reporting
+from unconstrain.cli.command import command
 from unconstrain.errors import DataError
-from unconstrain.policies import load_policy
+from unconstrain.progress import working
+
+SHOWN_EPISODES = 20
 
 
-def evaluate(
-    context: typer.Context,
-    policy: Annotated[Path, typer.Argument(help="A policy saved by `unconstrain fit`.", metavar="POLICY")],
-    files: recordings.Files,
-    state: recordings.State = None,
-    action: recordings.Action = None,
-    time: recordings.Time = None,
-    episode: recordings.Episode = None,
-    time_unit: recordings.TimeUnit = None,
-    window: recordings.Window = None,
-    gap: recordings.Gap = None,
-    max_speed: recordings.MaxSpeed = None,
-    min_speed: recordings.MinSpeed = None,
-    min_duration: recordings.MinDuration = None,
-) -> None:
+@command(epilog="For example:\n\n\b\nunconstrain evaluate wipe.skops other_day.csv")
+@click.argument("policy", type=click.Path(path_type=Path))
+@recordings.recorded
+def evaluate(policy: Path, recorded: recordings.Recorded) -> None:
     """Hold a saved policy against other recordings.
 
-    They are read as those it was learnt from, unless an option says otherwise; --state names all columns anew.
+    POLICY was saved by `unconstrain fit`, and FILES are read as those it was learnt from, unless an option says
+    otherwise; --state names all columns anew.
     """
+    import numpy as np
+
+    from unconstrain import metrics
+    from unconstrain.policies import load_policy
+
     learnt = load_policy(policy)
-    how = recordings.asked(context.params)
-    how = recordings.as_before(getattr(learnt, "recording_", {}), how)
-    console = reporting.console()
-    demos = recordings.read(files, how)
-    recordings.describe(console, demos)
+    with working("reading"):
+        demos = recorded.like(getattr(learnt, "recording_", {})).load()
+    recordings.describe(demos)
     if demos.states.shape[1] != learnt.n_features_in_ or demos.actions.shape[1] != learnt.n_actions_:
         raise DataError(
             f"{policy} maps {learnt.n_features_in_} states to {learnt.n_actions_} actions, but the recordings have "
             f"{demos.states.shape[1]} and {demos.actions.shape[1]}: choose the columns it was learnt from"
         )
     P = learnt.predict(demos.states).reshape(demos.actions.shape)
-    table = Table("episode", "samples", "inconsistency", "share of observed motion explained")
-    rows = [(demos.episode_labels[code], demos.episodes == code) for code in range(demos.n_episodes)]
-    if len(rows) > 1:
-        for label, mask in rows[:20]:
-            _add(table, label, demos.actions[mask], P[mask])
-        if len(rows) > 20:
-            table.add_row(f"... {len(rows) - 20} more", "", "", "")
-    _add(table, "all", demos.actions, P)
-    console.print(table)
+
+    def row(label: str, which: np.ndarray | slice) -> tuple[str, ...]:
+        U = demos.actions[which]
+        share = f"{metrics.explained(U, P[which]):.2%}" if np.any(U) else "nothing moves"
+        return label, str(len(U)), f"{metrics.inconsistency(U, P[which]):.4g}", share
+
+    rows = []
+    if demos.n_episodes > 1:
+        labels = demos.episode_labels[:SHOWN_EPISODES]
+        rows = [row(label, demos.episodes == code) for code, label in enumerate(labels)]
+        if demos.n_episodes > len(rows):
+            rows.append((f"... {demos.n_episodes - len(rows)} more", "", "", ""))
+    rows.append(row("all", slice(None)))
+    reporting.say_table(("episode", "samples", "inconsistency", "share of observed motion explained"), rows)
     if demos.policy is not None:
-        error = risk.normalized(risk.unconstrained_policy_error(demos.policy, P), demos.policy)
-        console.print(f"these recordings carry the true policy: nUPE {error:.4g}")
-
-
-def _add(table: Table, label: str, U: np.ndarray, P: np.ndarray) -> None:
-    share = f"{risk.explained(U, P):.2%}" if np.any(U) else "nothing moves"
-    table.add_row(label, str(len(U)), f"{risk.inconsistency(U, P):.4g}", share)
+        error = metrics.normalized(metrics.unconstrained_policy_error(demos.policy, P), demos.policy)
+        reporting.say(f"these recordings carry the true policy: nUPE {error:.4g}")

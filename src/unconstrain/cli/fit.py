@@ -1,221 +1,213 @@
 """`unconstrain fit`: from recordings to a policy, and by how much it beats ordinary regression."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
-import numpy as np
-import typer
-from rich.console import Console
-from rich.table import Table
-from sklearn.base import clone
+import click
 
-from unconstrain import plot
-from unconstrain import selection as comparison
-from unconstrain.arrays import check_choice
-from unconstrain.cli import models, recordings, reporting, streams
-from unconstrain.cli.reporting import quoted
-from unconstrain.constraints import from_recording
-from unconstrain.demonstrations import Demonstrations
-from unconstrain.diagnostics import identifiability
-from unconstrain.errors import DataError, PolicyError
-from unconstrain.fitting.observation import unknown
-from unconstrain.policies.base import Policy
+from unconstrain.cli import models, outputs, recordings, reporting
+from unconstrain.cli.command import command
+from unconstrain.cli.declared import option
+from unconstrain.errors import PolicyError
+from unconstrain.progress import working
+
+if TYPE_CHECKING:
+    from unconstrain.comparison import Comparison
+    from unconstrain.demonstrations import Demonstrations
+    from unconstrain.policies.base import Policy
+    from unconstrain.selection import Row
 
 WORTH_A_WARNING = 0.1
 """Share of the policy that recordings leave undetermined."""
 
-Model = Annotated[str, typer.Option("--model", help=f"One of {', '.join(models.MODELS)}.")]
-Out = Annotated[Path, typer.Option("--out", help="Where the policy is saved.")]
-Risk = Annotated[str, typer.Option("--risk", help="inconsistency, or direct for ordinary regression.")]
-Figure = Annotated[
-    Path | None, typer.Option("--figure", help="Draw recorded movement and learnt policy (PNG, SVG, PDF).")
-]
 
-
+@command(
+    short_help="Learn the policy behind recordings, and save it.",
+    epilog="For example:\n\n\b\nunconstrain fit wipe.csv --state x,y,z --time t --episode run --out wipe.skops",
+)
+@recordings.recorded
+@models.model
+@recordings.folds
+@outputs.out("policy.skops", "Where the policy is saved.")
+@outputs.figure("Draw recorded movement and learnt policy")
+@outputs.overwrite
+@option(
+    "--resumable",
+    is_flag=True,
+    help="Keep the moments too: for learning on, and for rollout --stop-when-unsure.",
+    section=outputs.SECTION,
+)
+@option(
+    "--checkpoint",
+    type=click.Path(path_type=Path),
+    help="Read as a stream, note here how far it has come, and go on from there if the file exists.",
+    section="More data than memory",
+)
+@option(
+    "--cluster",
+    metavar="ADDRESS",
+    help='Read on a Dask cluster: the address of its scheduler, tcp://HOST:PORT, or "local".',
+    section="More data than memory",
+)
 def fit(
-    context: typer.Context,
-    files: recordings.Files,
-    state: recordings.State = None,
-    action: recordings.Action = None,
-    time: recordings.Time = None,
-    episode: recordings.Episode = None,
-    model: Model = "locally-linear",
-    out: Out = Path("policy.skops"),
-    figure: Figure = None,
-    risk: Risk = "inconsistency",
-    alpha: models.Alpha = "cv",
-    centers: models.Centers = None,
-    n_centers: models.NCenters = None,
-    width: models.Width = None,
-    folds: recordings.Folds = None,
-    force: recordings.Force = None,
-    force_threshold: recordings.ForceThreshold = None,
-    free: recordings.Free = None,
-    time_unit: recordings.TimeUnit = None,
-    window: recordings.Window = None,
-    gap: recordings.Gap = None,
-    max_speed: recordings.MaxSpeed = None,
-    min_speed: recordings.MinSpeed = None,
-    min_duration: recordings.MinDuration = None,
-    checkpoint: streams.Checkpoint = None,
-    cluster: streams.Cluster = None,
-    resumable: Annotated[
-        bool,
-        typer.Option(
-            "--resumable", help="Keep the moments too: for learning on, and for rollout --stop-when-unsure."
-        ),
-    ] = False,
+    recorded: recordings.Recorded,
+    model: models.Model,
+    folds: str | None,
+    out: Path,
+    figure: Path | None,
+    overwrite: bool,
+    resumable: bool,
+    checkpoint: Path | None,
+    cluster: str | None,
 ) -> None:
     """Learn the unconstrained policy behind recordings, and save it.
 
-    `unconstrain fit wipe.csv --state x,y,z --time t --episode run --out wipe.skops`
+    FILES are recordings in CSV, NPZ or Parquet files, folders of Parquet files, or LeRobot datasets. Folders, URIs such
+    as s3://bucket/folder, and whatever is read with --checkpoint or --cluster need not fit into memory.
     """
-    recordings.check_writable(out, figure)
-    plot.check_suffix(figure)
-    check_choice(model, "--model", models.MODELS)
-    check_choice(risk, "--risk", ("inconsistency", "direct"))
-    if folds is not None:
-        check_choice(folds, "--folds", recordings.FOLDS)
-    _check_known(force, force_threshold, free, risk)
-    how, told = recordings.asked(context.params), recordings.told(context.params)
-    named = _candidates(
-        model, risk=risk, alpha=models.decay(alpha), centers=centers, n_centers=n_centers, width=width
+    outputs.check_outputs(
+        recorded.files,
+        {"out": out, "figure": figure},
+        overwrite=overwrite,
+        continued={"checkpoint": checkpoint},
     )
-    if told:
-        risk = "auto"
-        named = named and {name: policy.set_params(risk=risk) for name, policy in named.items()}
-    console = reporting.console()
-    needs_memory = {"figure": figure, "folds": folds, "min_speed": min_speed}
-    at_once = named is None or any(value is not None for value in needs_memory.values())
-    if streams.is_meant(files, checkpoint, cluster, at_once):
-        if force_threshold is not None:
-            told["force_threshold"] = force_threshold
-        streamed = streams.learn(
-            console, named[model] if named else None, files, how | told, checkpoint, cluster, **needs_memory
+    if model.risk == "direct" and recorded.tells_constraints:
+        raise PolicyError(
+            "ordinary regression makes no use of constraints: leave out --risk direct, or else force=, free= and "
+            "projections="
         )
-        streamed.recording_ = how
-        streamed.save(out, resumable=resumable)
-        _point_on(console, out)
+    if checkpoint is not None and cluster is not None:
+        raise PolicyError("a cluster makes up for workers it loses: leave out checkpoint= or cluster=")
+    needs_memory = {"--model auto": model.is_chosen, "figure=": figure, "folds=": folds}
+    named = [option for option, given in needs_memory.items() if given]
+    if checkpoint is not None or cluster is not None or (recorded.is_large and not named):
+        if named:
+            raise PolicyError(f"{named[0]} needs all data in memory, and a stream is read once: leave it out")
+        policy = _fit_stream(recorded, model, checkpoint, cluster)
+        policy.save(out, resumable=resumable)
+        _describe_stream(policy)
+        _suggest(out)
         return
-    with console.status("reading"):
-        demos = recordings.read(files, how | told)
-    recordings.describe(console, demos)
-    groups = recordings.folds_of(demos, folds)
-    known = None
-    if told:
-        known = from_recording(demos, force_threshold=force_threshold)
-        _describe_known(console, known)
-
-    chosen, found = _compare(console, demos, groups, model, named, risk, known)
-    policy = found.policies[chosen]
-    policy.recording_ = how
+    with working("reading"):
+        demos = recorded.load()
+    recordings.describe(demos)
+    comparison = _compare(demos, model, folds)
+    policy = comparison.policy
+    policy.recording_ = recorded.kept()
     policy.state_names_ = list(demos.state_names)
-    console.print(
+    policy.save(out, resumable=resumable)
+    if figure is not None:
+        from unconstrain import plot
+
+        plot.save(plot.policy_figure(policy, demos), figure)
+    _describe(comparison, demos)
+    if figure is not None:
+        reporting.say(f"figure: {figure}")
+    _suggest(out, demos)
+
+
+def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) -> "Comparison":
+    from unconstrain.comparison import compare_risks
+    from unconstrain.constraints.recorded import describe_known
+
+    if demos.projections is not None:
+        reporting.say(f"constraints: {describe_known(demos.projections)}")
+    with working("fitting") as report:
+
+        def progress(row: "Row") -> None:
+            report(f"fitted {row.name} in {row.seconds:.1f} s")
+
+        policy = None if model.is_chosen else model.build()
+        if policy is not None and demos.projections is not None:
+            policy.set_params(risk="auto")
+        return compare_risks(
+            policy,
+            demos.states,
+            demos.actions,
+            demos.folds(folds),
+            projections=demos.projections,
+            progress=progress,
+        )
+
+
+def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
+    from unconstrain.diagnostics import identifiability
+
+    policy = comparison.policy
+    if comparison.chosen is not None:
+        reporting.say(str(comparison.chosen))
+    reporting.say(
         f"zero actions: {policy.n_zero_actions_} without a direction, left out by the inconsistency"
     )
-    console.print(
-        f"λ: {policy.alpha_:.3g}" + (" (chosen by cross-validation)" if policy.alpha == "cv" else "")
+    chosen = " (chosen by cross-validation)" if policy.alpha == "cv" else ""
+    reporting.say(f"λ: {policy.alpha_:.3g}{chosen}")
+    reporting.say_table(
+        ("learnt by", comparison.measure, "share of observed motion explained"),
+        [
+            (
+                f"{risk} (saved)" if row is comparison.kept else risk,
+                f"{row.inconsistency:.4g}",
+                f"{row.explained:.2%}",
+            )
+            for risk, row in comparison.by_risk().items()
+        ],
     )
-    _report(console, found, policy.risk)
-    undetermined = (
-        1.0 - identifiability(policy, demos.states, demos.actions, projections=known).determined_share
-    )
-    if undetermined >= WORTH_A_WARNING:
-        console.print(
-            f"warning: {undetermined:.0%} of the policy is not determined by these recordings; `unconstrain diagnose` "
-            "says where, and what to record next",
-            soft_wrap=True,
-        )
-    if figure is not None:
-        plot.save(plot.policy_figure(policy, demos), figure)
-        console.print(f"figure: {figure}")
-    policy.save(out, resumable=resumable)
-    _point_on(console, out)
-    start = ",".join(f"{value:.3g}" for value in demos.states[0])
-    if demos.states.shape[1] == demos.actions.shape[1]:
-        console.print(
-            f'  unconstrain rollout {quoted(out)} --start="{start}" --steps 500 --dt 0.02',
+    report = identifiability(policy, demos.states, demos.actions, projections=demos.projections)
+    if 1.0 - report.determined_share >= WORTH_A_WARNING:
+        reporting.say(
+            f"warning: {1.0 - report.determined_share:.0%} of the policy is not determined by these recordings; "
+            "`unconstrain diagnose` says where, and what to record next"
         )
 
 
-def _point_on(console: Console, out: Path) -> None:
-    console.print(f"policy: {out}")
-    console.print("\nnext, on recordings the policy has not seen, or to see where it leads:")
-    console.print(f"  unconstrain evaluate {quoted(out)} OTHER_FILES...")
-
-
-def _candidates(model: str, **options) -> dict[str, Policy] | None:
-    """The model by its name; None for "auto", whose candidates depend on the data."""
-    if model != "auto":
-        return {model: models.build(model, **options)}
-    given = [name for name in ("centers", "n_centers", "width") if options[name] is not None]
-    if given or options["alpha"] != "cv" or options["risk"] != "inconsistency":
-        raise PolicyError(
-            "--model auto makes its own choices: leave out --risk, --alpha, --centers, --n-centers, --width"
-        )
-    return None
-
-
-def _check_known(force: str | None, threshold: float | None, free: str | None, risk: str) -> None:
-    if force is not None and threshold is None:
-        raise DataError(
-            "--force needs --force-threshold, above which a force is a contact, in the forces' unit"
-        )
-    if threshold is not None and force is None:
-        raise DataError("--force-threshold is for forces: name their columns with --force")
-    if risk == "direct" and (force is not None or free is not None):
-        raise PolicyError(
-            "ordinary regression makes no use of constraints: leave out --risk direct, or --force and --free"
+def _suggest(out: Path, demos: "Demonstrations | None" = None) -> None:
+    """Name the commands that come next; with the recordings, a start for a rollout."""
+    reporting.say(f"policy: {out}")
+    reporting.say("\nnext, on recordings the policy has not seen, or to see where it leads:")
+    reporting.say(f"  unconstrain evaluate {reporting.shell_word(out)} OTHER_FILES...")
+    if demos is not None and demos.states.shape[1] == demos.actions.shape[1]:
+        first, scales = demos.states[0], demos.states.std(axis=0)
+        start = ",".join(reporting.shown_number(*pair) for pair in zip(first, scales, strict=True))
+        reporting.say(
+            f'  unconstrain rollout {reporting.shell_word(out)} --start="{start}" --steps 500 --dt 0.02 --overwrite'
         )
 
 
-def _describe_known(console: Console, N: np.ndarray) -> None:
-    """Say of how many samples the constraint is known."""
-    hidden, free = unknown(N), (np.eye(N.shape[1]) == N).all(axis=(1, 2))
-    console.print(
-        f"constraints: known of {np.mean(~hidden):.1%} of the samples ({np.mean(~hidden & ~free):.1%} in contact, "
-        f"{np.mean(free):.1%} free), not of {np.mean(hidden):.1%}"
-    )
+def _fit_stream(
+    recorded: recordings.Recorded, model: models.Model, checkpoint: Path | None, cluster: str | None
+) -> "Policy":
+    from unconstrain.scaling import cluster as distributed
+    from unconstrain.scaling.stream import fit_stream
+
+    policy, how = model.build(), recorded.arguments()
+    source = recorded.files[0] if len(recorded.files) == 1 else recorded.files
+    if recorded.tells_constraints:
+        policy.set_params(risk="auto")
+    if cluster is None:
+        fit_stream(policy, source, **how, checkpoint=checkpoint, progress=True)
+    else:
+        with distributed.connected(cluster) as client:
+            distributed.fit(policy, source, client, **how, progress=True)
+    policy.recording_ = recorded.kept()
+    return policy
 
 
-def _compare(
-    console: Console,
-    demos: Demonstrations,
-    groups: np.ndarray,
-    model: str,
-    named: dict[str, Policy] | None,
-    risk: str,
-    known: np.ndarray | None,
-) -> tuple[str, comparison.Selection]:
-    """The name of the policy asked for, and the comparison that holds it next to the other risk's.
+def _describe_stream(policy: "Policy") -> None:
+    from unconstrain.fitting.moments import Moments
 
-    named: the model by its name, or None for a choice of models; known: projections (N, d, d), NaN where not known.
-    """
-    data = (demos.states, demos.actions, groups)
-    with console.status("fitting") as status:
-
-        def progress(row: comparison.Row) -> None:
-            status.update(f"fitted {row.name} in {row.seconds:.1f} s")
-
-        if named is None:
-            found = comparison.select_policy("auto", *data, projections=known, progress=progress)
-            console.print(str(found.table))
-            model, named = found.name, {found.name: found.policy}
-        other = "inconsistency" if risk in ("direct", "auto") else "direct"
-        pair = {
-            f"{model}, {risk}": clone(named[model]),
-            f"{model}, {other}": clone(named[model]).set_params(risk=other),
-        }
-        result = comparison.select_policy(pair, *data, projections=known, progress=progress)
-    asked = f"{model}, {risk}"
-    if result.table[asked].problem:
-        raise PolicyError(str(result.table[asked].problem))
-    return asked, result
-
-
-def _report(console: Console, result: comparison.Selection, kept: str) -> None:
-    table = Table("learnt by", result.table.measure, "share of observed motion explained")
-    for row in sorted(result.table, key=lambda row: row.name.endswith("direct")):
-        name = row.name.split(", ")[-1] + (" (saved)" if row.name.endswith(kept) else "")
-        table.add_row(name, f"{row.inconsistency:.4g}", f"{row.explained:.2%}")
-    console.print(table)
+    folds = getattr(policy, "folds_", None)
+    episodes = f" in {len(folds.fold_of):,} episodes" if folds is not None else ""
+    reporting.say(f"read: {policy.n_samples_seen_:,} samples{episodes}")
+    if policy.n_known_constraints_:
+        share = policy.n_known_constraints_ / policy.n_samples_seen_
+        reporting.say(f"constraints: known of {share:.1%} of the samples")
+    reporting.say(f"zero actions: {policy.n_zero_actions_:,} without a direction")
+    if not hasattr(policy, "held_out_risk_"):
+        return
+    total = Moments.sum(part for part in policy.moments_ if part is not None)
+    error = float(policy.held_out_risk_[policy.alphas_ == policy.alpha_][0])
+    motion = float(total.squares.sum() / total.weight.sum())
+    each = ", of the local models each by itself" if total.weight.ndim else ""
+    explained = f", {1 - error / motion:.2%} of observed motion explained" if motion else ""
+    reporting.say(f"λ: {policy.alpha_:.3g} (chosen by cross-validation)")
+    reporting.say(f"held-out risk{each}: {error:.4g}{explained}")

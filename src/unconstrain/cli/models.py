@@ -1,61 +1,118 @@
-"""The models the command line can fit, by name, and their options."""
+"""Which model a command fits: options that `fit` and `diagnose` share."""
 
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-import typer
+import click
 
-from unconstrain.arrays import check_number
+from unconstrain.cli.declared import Number, gathered, option
 from unconstrain.errors import PolicyError
-from unconstrain.features import NormalizedRBF
-from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
-from unconstrain.policies.base import Policy
+
+if TYPE_CHECKING:
+    from unconstrain.policies.base import Policy
 
 MODELS = ("linear", "rbf", "locally-linear", "auto")
-
-Alpha = Annotated[str, typer.Option("--alpha", help='Weight decay λ: a number, or "cv" to choose it.')]
-Centers = Annotated[
-    str | None, typer.Option("--centers", help="kmeans, grid or coverage, for models with centres.")
-]
-NCenters = Annotated[int | None, typer.Option("--n-centers", help="How many centres.")]
-Width = Annotated[
-    float | None, typer.Option("--width", help="σ of the receptive fields, in the states' unit.")
-]
+RISKS = ("inconsistency", "direct")
+PLACEMENTS = ("grid", "kmeans", "coverage")
+PLACED = ("centers", "n_centers", "width")
+"""Options of models that have centres."""
 
 
-def build(
-    name: str,
-    *,
-    risk: str = "inconsistency",
-    alpha: str | float = "cv",
-    centers: str | None = None,
-    n_centers: int | None = None,
-    width: float | None = None,
-) -> Policy:
-    """The estimator called `name`, one of `MODELS` but "auto". Options of None are left to the estimator.
+@dataclass(frozen=True)
+class Model:
+    """A model by its name, and its options; None stands for the model's own default.
 
-    Raises `PolicyError` for an unknown name, and for options the model does not have.
+    Raises
+    ------
+    PolicyError
+        An option is given that the model does not have.
     """
-    placed: dict[str, Any] = {"centers": centers, "n_centers": n_centers, "width": width}
-    placed = {option: value for option, value in placed.items() if value is not None}
-    if name == "linear":
-        if placed:
+
+    name: str = "locally-linear"
+    risk: str = "inconsistency"
+    alpha: float | str = "cv"
+    centers: str | None = None
+    n_centers: int | None = None
+    width: float | None = None
+
+    def __post_init__(self) -> None:
+        placed = list(self._placed())
+        if self.name == "linear" and placed:
+            raise PolicyError(f"the linear model has no centres: leave out {placed[0]}=")
+        if self.is_chosen and (placed or self.alpha != "cv" or self.risk != "inconsistency"):
             raise PolicyError(
-                f"the linear model has no centres: leave out --{next(iter(placed)).replace('_', '-')}"
+                "--model auto makes its own choices: leave out risk=, alpha=, centers=, n_centers= and width="
             )
-        return ParametricPolicy(risk=risk, alpha=alpha)
-    if name == "rbf":
-        return ParametricPolicy(NormalizedRBF(**placed), risk=risk, alpha=alpha)
-    if name == "locally-linear":
-        return LocallyLinearPolicy(**placed, risk=risk, alpha=alpha)
-    raise PolicyError(f"there is no model {name!r}: choose one of {', '.join(MODELS)}")
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether the model is chosen among several, which depend on the data."""
+        return self.name == "auto"
+
+    def build(self) -> "Policy":
+        """Make the estimator; not for a model that is chosen."""
+        from unconstrain.features import NormalizedRBF
+        from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
+
+        placed = self._placed()
+        if self.name == "linear":
+            return ParametricPolicy(risk=self.risk, alpha=self.alpha)
+        if self.name == "rbf":
+            return ParametricPolicy(NormalizedRBF(**placed), risk=self.risk, alpha=self.alpha)
+        return LocallyLinearPolicy(**placed, risk=self.risk, alpha=self.alpha)
+
+    def _placed(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in PLACED if getattr(self, name) is not None}
 
 
-def decay(text: str) -> str | float:
-    """`--alpha`: "cv" or a number, not below zero. Raises `PolicyError` for anything else."""
-    if text == "cv":
-        return text
-    try:
-        number = float(text)
-    except ValueError:
-        raise PolicyError(f'--alpha must be a number or "cv", got {text!r}') from None
-    return check_number(number, "--alpha", positive=False)
+model = gathered(
+    "model",
+    [
+        option(
+            "--model",
+            "name",
+            type=click.Choice(MODELS),
+            default="locally-linear",
+            show_default=True,
+            help="What the policy is made of; auto compares several by what they predict of held-out episodes.",
+            section="Model",
+        ),
+        option(
+            "--risk",
+            type=click.Choice(RISKS),
+            default="inconsistency",
+            show_default=True,
+            help="What is minimised; direct is ordinary regression.",
+            section="Model",
+        ),
+        option(
+            "--alpha",
+            type=Number(zero=True, words=("cv",)),
+            default="cv",
+            show_default=True,
+            help='Weight decay λ: a number, or "cv" to choose it by cross-validation.',
+            section="Model",
+        ),
+        option(
+            "--centers",
+            type=click.Choice(PLACEMENTS),
+            help="How centres are placed, in models that have them.",
+            section="Model",
+        ),
+        option(
+            "--n-centers",
+            type=click.IntRange(min=1),
+            metavar="NUMBER",
+            help="How many centres, in models that have them.",
+            section="Model",
+        ),
+        option(
+            "--width",
+            type=Number(),
+            help="Standard deviation σ of the receptive fields, in the states' unit.",
+            section="Model",
+        ),
+    ],
+    Model,
+)
+"""Decorator of a command that fits a model, and is called with `model=Model(...)`."""

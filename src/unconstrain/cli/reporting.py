@@ -1,19 +1,137 @@
-"""How the program talks: text as it is, and commands that can be pasted."""
+"""How the program talks: text as it is, on streams that may be closed, and commands that can be pasted."""
 
+import io
+import math
+import os
 import shlex
-from pathlib import Path
-
-from rich.console import Console
-
-INTERRUPTED = 130
-"""The exit code after Ctrl-C, as shells have it."""
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import TextIO
 
 
-def console() -> Console:
-    """A console that takes text literally: brackets in names of files and columns are no markup."""
-    return Console(markup=False, highlight=False, soft_wrap=True)
+@contextmanager
+def forgiving_output() -> Iterator["ForgivingOutput"]:
+    """Let standard output fail without stopping the work or losing its result: see `ForgivingOutput`."""
+    given = sys.stdout
+    assert isinstance(given, io.TextIOWrapper)
+    given.flush()
+    output = ForgivingOutput(given)
+    sys.stdout = output
+    try:
+        yield output
+    finally:
+        sys.stdout = given
+        output.flush()
+        output.detach()
 
 
-def quoted(path: Path) -> str:
-    """A path as a shell takes it."""
-    return shlex.quote(str(path))
+class ForgivingOutput(io.TextIOWrapper):
+    r"""A text stream over another that notes the first failure to write, and drops what comes after it.
+
+    A pipe whose reader has gone and a full disk are such failures. Letters that the encoding lacks are written as
+    Python writes them, ``\u03bb``.
+
+    Parameters
+    ----------
+    stream : text stream
+        Where to write.
+
+    Attributes
+    ----------
+    failure : str or None
+        The reason of the first failure.
+    """
+
+    def __init__(self, stream: io.TextIOWrapper) -> None:
+        super().__init__(
+            stream.buffer, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering
+        )
+        self.failure: str | None = None
+
+    def write(self, text: str) -> int:
+        """Write text, unless writing has failed before."""
+        if self.failure is None:
+            try:
+                return super().write(text)
+            except OSError as error:
+                self._fail(error)
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush, unless writing has failed before."""
+        if self.failure is None:
+            try:
+                super().flush()
+            except OSError as error:
+                self._fail(error)
+
+    def _fail(self, error: OSError) -> None:
+        self.failure = os.strerror(error.errno).lower() if error.errno else str(error)
+        # Buffers are flushed once more when Python ends: what is left in them goes nowhere.
+        with suppress(OSError), open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), self.fileno())
+            super().flush()
+
+
+def say(text: str = "") -> None:
+    """Print text to standard output as it is, control characters made visible."""
+    print(visible(text), flush=True)  # so that a reader of a pipe hears of it while the work goes on
+
+
+def say_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
+    """Print a table to standard output, its cells as they are, control characters made visible."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*columns, title=title)
+    for row in rows:
+        table.add_row(*map(visible, row))
+    Console(markup=False, highlight=False).print(table)
+
+
+def say_error(text: str, hint: str | None = None) -> None:
+    """Print a mistake to standard error, and where to read more."""
+    style, plain = ("\x1b[1;31m", "\x1b[0m") if _is_colored(sys.stderr) else ("", "")
+    with suppress(OSError):
+        print(f"{style}error:{plain} {visible(text)}", file=sys.stderr)
+        if hint is not None:
+            print(hint, file=sys.stderr)
+
+
+def visible(text: str) -> str:
+    r"""Write out what cannot be printed, so that no name of a file or column steers the terminal.
+
+    >>> visible("a\x1b[2Jb")
+    'a\\x1b[2Jb'
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape", "surrogatepass").decode()
+        for c in text
+    )
+
+
+def shell_word(path: str | os.PathLike[str]) -> str:
+    """Write a path so that a shell takes it for one word, and a program for no option.
+
+    >>> shell_word("-a b.csv")
+    "'./-a b.csv'"
+    """
+    name = os.fspath(path)
+    return shlex.quote(f"./{name}" if name.startswith("-") else name)
+
+
+def shown_number(value: float, scale: float) -> str:
+    """Write a number with as many digits as matter where numbers differ by `scale`, and at least three.
+
+    >>> shown_number(5512345.678, 20.0), shown_number(0.123456, 0.5), shown_number(0.0, 0.0)
+    ('5512345.68', '0.1235', '0')
+    """
+    least = min((size for size in (abs(value), scale) if size > 0), default=1.0)
+    return f"{round(float(value), 3 - math.floor(math.log10(least))) + 0.0:.15g}"
+
+
+def _is_colored(stream: TextIO) -> bool:
+    return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"

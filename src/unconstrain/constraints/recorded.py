@@ -59,3 +59,24 @@ def from_recording(
         return felt
     felt[(felt == np.eye(d)).all(axis=(1, 2))] = np.nan
     return first_known(from_flags(free, d), felt)
+
+
+def describe_known(projections: NDArray[np.float64]) -> str:
+    """Say of how many samples the constraint is known.
+
+    Parameters
+    ----------
+    projections : array (N, d, d)
+        All NaN where nothing is known.
+
+    Returns
+    -------
+    str
+        Shares of samples: known, in contact, free, unknown.
+    """
+    unknown = np.isnan(projections).all(axis=(1, 2))
+    free = (projections == np.eye(projections.shape[1])).all(axis=(1, 2))
+    return (
+        f"known of {np.mean(~unknown):.1%} of the samples ({np.mean(~unknown & ~free):.1%} in contact, "
+        f"{np.mean(free):.1%} free), not of {np.mean(unknown):.1%}"
+    )

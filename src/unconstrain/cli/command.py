@@ -1,0 +1,114 @@
+"""What every command does with a mistake: one sentence in the words of the command line."""
+
+import functools
+import os
+import re
+from typing import Any
+
+import click
+
+from unconstrain.errors import UnconstrainError
+
+MISTAKE = 2
+"""The exit code after a mistake of the user's."""
+
+
+class Mistake(click.ClickException):
+    """A mistake of the user's, told in one sentence."""
+
+    exit_code = MISTAKE
+
+
+class Interrupted(click.ClickException):
+    """The user pressed Ctrl-C; click itself would end the line on standard error first."""
+
+
+class Command(click.Command):
+    """A command whose errors name options where the library names arguments, and whose help has sections."""
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options into the help, by section."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for option in self.get_params(context):
+            record = option.get_help_record(context)
+            if record is not None and isinstance(option, click.Option):
+                sections.setdefault(getattr(option, "section", "Options"), []).append(record)
+        for heading, records in sections.items():
+            with formatter.section(heading):
+                formatter.write_dl(records)
+
+    def invoke(self, context: click.Context) -> Any:
+        """Call the command; what it raises becomes a `Mistake`, unless it is a fault of the program's own."""
+        try:
+            return super().invoke(context)
+        except KeyboardInterrupt as stop:
+            raise Interrupted(str(stop)) from None
+        except UnconstrainError as error:
+            sentence = str(error)
+        except MemoryError as error:
+            reason = f" ({error})" if str(error) else ""
+            sentence = (
+                f"there is not enough memory for this{reason}: give less data, or ask for a smaller model"
+            )
+        except EOFError:
+            sentence = "a file ends too early, so it is damaged or still being written"
+        except RecursionError:
+            sentence = "something in the files is nested too deeply to be read"
+        except OverflowError as error:
+            sentence = f"a number is too large to compute with ({error})"
+        except OSError as error:
+            if error.errno is None:
+                raise
+            place = f" {error.filename}" if error.filename is not None else ""
+            sentence = f"cannot read or write{place}: {os.strerror(error.errno).lower()}"
+        raise Mistake(in_words_of_options(sentence, [name for name in map(_name, self.params) if name]))
+
+
+command = functools.partial(click.command, cls=Command)
+"""`click.command` that makes a `Command`."""
+
+
+class Group(click.Group):
+    """A group that lists its commands in the order in which they were added."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """Return the names of the commands."""
+        return list(self.commands)
+
+
+def in_words_of_options(sentence: str, names: list[str]) -> str:
+    """Write a sentence of the library's in the words of the command line.
+
+    Parameters
+    ----------
+    sentence : str
+        In which arguments are written ``name=``, or ``snake_case``, or begin a sentence that says what they must be.
+    names : list of str
+        The arguments that are options of the command.
+
+    Returns
+    -------
+    str
+        The sentence with ``--name`` in their place.
+
+    Examples
+    --------
+    >>> in_words_of_options("give action= or time_unit", ["action", "time_unit"])
+    'give --action or --time-unit'
+    >>> in_words_of_options('choose alpha="cv"', ["alpha"])
+    'choose --alpha "cv"'
+    """
+    for name in names:
+        option = f"--{name.replace('_', '-')}"
+        start = r"(?<![\w'\"/.=-])"  # neither part of a word, nor in quotes, nor of a path
+        # Followed by a value, unless by a space or the end of a clause.
+        sentence = re.sub(rf"{start}{name}=(?!$|[\s,;:)]|\.(?:\s|$))", f"{option} ", sentence)
+        sentence = re.sub(rf"{start}{name}=", option, sentence)
+        if "_" in name:
+            sentence = re.sub(rf"{start}{name}(?![\w'\"/.])", option, sentence)
+        sentence = re.sub(rf"^{name}(?= must )", option, sentence)
+    return sentence
+
+
+def _name(option: click.Parameter) -> str | None:
+    return option.name if isinstance(option, click.Option) else None

@@ -1,0 +1,26 @@
+import shlex
+
+import unconstrain as uc
+
+
+def test_demo_ends_with_a_command_that_works_twice(run, tmp_path):
+    folder = tmp_path / "a [demo] of mine"
+    code, out, _ = run("demo", "--out", folder.name)
+    assert code == 0
+    assert {p.name for p in folder.iterdir()} == {"limit-cycle.png", "table.md", "movements.csv"}
+    last = shlex.split(out.strip().splitlines()[-1])
+    assert last[0] == "unconstrain"
+    for _ in range(2):
+        code, out, err = run(*last[1:])
+        assert code == 0, err
+    assert uc.load_policy(folder / "policy.skops").score([[0.5, 0.5]], [[0.5, -0.5]]) > 0.9
+    code, _, err = run("demo", "--out", folder.name)
+    assert code == 2
+    assert "limit-cycle.png exists: give --overwrite" in err
+
+
+def test_a_folder_that_cannot_be_made_is_a_mistake(run, tmp_path):
+    (tmp_path / "taken").write_text("")
+    code, _, err = run("demo", "--out", "taken")
+    assert code == 2
+    assert "cannot make the folder taken" in err

@@ -1,0 +1,52 @@
+import pytest
+
+import unconstrain as uc
+from tests.cli.commands import COLUMNS, share
+from unconstrain import limit_cycle as toy
+from unconstrain.recordings.text import write_csv
+
+
+def test_recordings_are_read_as_when_the_policy_was_fitted(run, movements, tmp_path):
+    code, _, err = run("fit", movements, *COLUMNS, "--model", "rbf")
+    assert code == 0, err
+    code, out, _ = run("evaluate", "policy.skops", movements)
+    assert code == 0
+    assert "1600 samples, 40 episodes" in out
+    assert "... 20 more" in out
+    others = tmp_path / "others.npz"
+    uc.save(toy.demonstrate(5, random_state=1), others)
+    code, out, _ = run("evaluate", "policy.skops", others, "--state", "states", "--action", "actions")
+    assert code == 0
+    assert share(out.splitlines()[-2]) > 0.9
+    code, out, _ = run("evaluate", "policy.skops", movements, "--min-speed", "0.5")
+    assert code == 0
+    assert "slower than 0.5" in out
+
+
+def test_options_of_the_fit_are_kept_unless_given_anew(run, tmp_path):
+    demos = toy.demonstrate(6, random_state=0)
+    write_csv(demos, tmp_path / "d.csv")
+    moving = ("--state", "x1,x2", "--time", "t", "--episode", "episode", "--window", "0.1")
+    assert run("fit", "d.csv", *moving, "--min-speed", "0.3", "--model", "linear")[0] == 0
+    same, other = (
+        run("evaluate", "policy.skops", "d.csv", *more)[1] for more in ((), ("--min-speed", "0.4"))
+    )
+    assert "slower than 0.3" in same
+    assert "slower than 0.4" in other
+    assert "of 240 samples" in other
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nowhere.skops", "DATA"], "no such policy file"),
+        (["DATA", "DATA"], "holds no policy saved by unconstrain"),
+        (["POLICY", "DATA", "--state", "x1", "--action", "u1"], "maps 2 states to 2 actions"),
+    ],
+)
+def test_mistakes(run, movements, policy, arguments, sentence):
+    places = {"DATA": movements, "POLICY": policy}
+    code, _, err = run("evaluate", *(places.get(argument, argument) for argument in arguments))
+    assert code == 2
+    assert sentence in err
+    assert "Traceback" not in err

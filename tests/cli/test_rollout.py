@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from unconstrain.policies import load_policy
+
+
+def test_a_movement_under_a_constraint(run, policy, tmp_path):
+    code, out, err = run(
+        "rollout", policy, "--start", "0.1,0.1", "--steps", 50, "--block", "1,0", "--figure", "r.svg"
+    )
+    assert code == 0, err
+    path = np.genfromtxt("rollout.csv", delimiter=",", names=True)
+    assert path.dtype.names == ("t", "x1", "x2", "x1_velocity", "x2_velocity")
+    assert len(path) == 51
+    np.testing.assert_allclose(path["x1"], 0.1)
+    assert np.ptp(path["x2"]) > 0.01
+    assert (tmp_path / "r.svg").exists()
+    assert "after 1 s: x1 0.1, x2 " in out
+    before = (tmp_path / "rollout.csv").read_text()
+    code, _, err = run("rollout", policy, "--start", "0.2,0.1")
+    assert code == 2
+    assert "rollout.csv exists: give --overwrite to replace it, or another name with --out" in err
+    assert (tmp_path / "rollout.csv").read_text() == before
+    assert run("rollout", policy, "--start", "0.2,0.1", "--overwrite")[0] == 0
+    assert (tmp_path / "rollout.csv").read_text() != before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--start", "0.1"], "--start must have 2 numbers"),
+        (["--start", "a,b"], "it must be numbers separated by commas"),
+        (["--start", "0,nan"], "its numbers must be finite"),
+        (["--start", "0,0", "--block", "1"], "--block must have 2 numbers"),
+        (["--start", "0,0", "--dt", "0"], "'--dt': it must be a positive number"),
+        (["--start", "0,0", "--steps", "0"], "'--steps'"),
+        (["--start", "0,0", "--steps", str(10**12)], "take fewer steps"),
+        (["--start", "0,0", "--figure", "r.txt"], "r.txt"),
+        (["--start", "0,0", "--out", "kept.skops", "--overwrite"], "choose another name for --out"),
+        (["--start", "0,0", "--out", "a.png", "--figure", "./a.png"], "--out and --figure are the same file"),
+    ],
+)
+def test_mistakes(run, policy, tmp_path, arguments, sentence):
+    code, _, err = run("rollout", policy, *arguments)
+    assert code == 2, err
+    assert sentence in err
+    assert {p.name for p in tmp_path.iterdir()} == {policy.name}
+    assert load_policy(policy).n_features_in_ == 2

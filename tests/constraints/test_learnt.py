@@ -224,7 +224,7 @@ def test_fit_takes_forces_and_flags(run, table):
     assert "held-out error" in out
     assert "held-out inconsistency" not in out
     assert uc.load_policy("policy.skops").risk == "auto"
-    code, out, _ = run("fit", "table.csv", *table, "--model", "linear", "--free", "free")
+    code, out, _ = run("fit", "table.csv", *table, "--model", "linear", "--free", "free", "--overwrite")
     assert "known of 25.0%" in out
 
 

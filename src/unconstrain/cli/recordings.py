@@ -92,12 +92,15 @@ class Recorded:
 
 def _recorded(files: tuple[str, ...], **values: Any) -> Recorded:
     names = _names(Columns)
-    return Recorded(
-        files,
-        Columns(**{name: value for name, value in values.items() if name in names}),
-        Preparation(**{name: value for name, value in values.items() if name not in names}),
-        frozenset(name for name in values if is_given(name)),
-    )
+    columns = Columns(**{name: value for name, value in values.items() if name in names})
+    preparation = Preparation(**{name: value for name, value in values.items() if name not in names})
+    if columns.force is not None and preparation.force_threshold is None:
+        raise DataError(
+            "force= needs force_threshold=, above which a force is a contact, in the forces' unit"
+        )
+    if columns.force is None and preparation.force_threshold is not None:
+        raise DataError("force_threshold= is for forces: name their columns with force=")
+    return Recorded(files, columns, preparation, frozenset(name for name in values if is_given(name)))
 
 
 def _names(declaration: type) -> frozenset[str]:

@@ -32,9 +32,6 @@ UNFINISHED = (
     "unconstrain.recordings.",
     "unconstrain.demonstrations.",
     "unconstrain.constraints.recorded.",
-    "unconstrain.constraints.forces.",
-    "unconstrain.constraints.measured.",
-    "unconstrain.constraints.nullspace.",
     "unconstrain.storage.",
     "unconstrain.deploy.",
 )

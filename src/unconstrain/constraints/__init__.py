@@ -5,11 +5,12 @@ left of a policy under it is ``u = N π(x)``, with ``N = I - A⁺A`` the project
 
 `projection` takes the rows themselves; `from_normals`, `from_jacobian`, `from_forces` and `from_flags` start from what
 is measured. Where a sample's constraint is not known its projection is all NaN, and ``policy.fit(X, U,
-projections=N)`` learns from that sample what can be learnt without (``risk="auto"``). `learnt_constraints` finds
-constraints in the actions.
+projections=N)`` learns from that sample what its direction of motion says. Constraints that are found in the actions
+themselves are in `unconstrain.constraints.learnt`.
 """
 
-from unconstrain.constraints.forces import contact, from_forces
+from unconstrain.constraints.contacts import contact
+from unconstrain.constraints.forces import from_forces
 from unconstrain.constraints.measured import first_known, from_flags, from_jacobian, from_normals
 from unconstrain.constraints.nullspace import (
     NEGLIGIBLE_ROW,

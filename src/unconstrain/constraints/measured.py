@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import check_numbers
 from unconstrain.constraints.nullspace import projection, unconstrained
 from unconstrain.errors import DataError
 
@@ -15,23 +16,28 @@ Array = NDArray[np.float64]
 
 
 def from_normals(normals: ArrayLike, jacobian: ArrayLike | None = None) -> Array:
-    """Projections (N, d, d) from the directions in which contacts block the motion, ``n·v = 0``.
+    """Compute projections from the directions in which contacts block the motion, ``n·v = 0``.
 
     Parameters
     ----------
-    normals : array (N, m) or (N, k, m)
+    normals : array_like of shape (N, m) or (N, k, m)
         One or several contact normals a sample, of any length and sign. A zero normal is no contact; a sample with
         NaN in its normals is one of which nothing is known.
-    jacobian : array (N, m, d), optional
+    jacobian : array_like of shape (N, m, d), optional
         From actions to the velocities that the normals speak of, ``v = J u``: a contact at a robot's hand, with joint
         velocities as actions, has the constraint row ``nᵀJ``. By default v is the action itself.
+
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        Nullspace projections, all NaN where nothing is known.
 
     Raises
     ------
     DataError
         If shapes do not match, or an entry is infinite.
     """
-    n = _numbers("normals", normals)
+    n = _check_not_infinite("normals", normals)
     if n.ndim == 2:
         n = n[:, None, :]
     if n.ndim != 3:
@@ -41,20 +47,33 @@ def from_normals(normals: ArrayLike, jacobian: ArrayLike | None = None) -> Array
     unknown = np.asarray(np.isnan(n).any(axis=(1, 2)))
     rows = np.where(unknown[:, None, None], 0.0, n)
     if jacobian is not None:
-        rows = rows @ checked_jacobians(jacobian, len(n), n.shape[2])
+        rows = rows @ check_jacobians(jacobian, len(n), n.shape[2])
     N = projection(rows)
     N[unknown] = np.nan
     return N
 
 
 def from_jacobian(jacobian: ArrayLike, rows: Sequence[int] | None = None) -> Array:
-    """Projections (N, d, d) under which the chosen rows of a Jacobian (N, m, d) do not move: ``A = J[rows]``.
+    """Compute projections under which chosen rows of a task Jacobian do not move, ``A = J[rows]``.
 
-    rows: of the m task coordinates, those that are held fixed, counted from 0; all of them by default.
+    Parameters
+    ----------
+    jacobian : array_like of shape (N, m, d)
+        One a sample, from actions to the velocities of m task coordinates.
+    rows : sequence of int, optional
+        Those task coordinates that are held fixed, counted from 0; all of them by default.
 
-    Raises `DataError` if the Jacobian is not (N, m, d) and finite, or has no such row.
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        Nullspace projections.
+
+    Raises
+    ------
+    DataError
+        If the Jacobian is of another shape or not finite, or has no such row.
     """
-    J = _numbers("the Jacobian", jacobian)
+    J = _check_not_infinite("the Jacobian", jacobian)
     if J.ndim != 3:
         raise DataError(f"the Jacobian must be (samples, task coordinates, actions), got shape {J.shape}")
     chosen = list(range(J.shape[1])) if rows is None else list(rows)
@@ -65,13 +84,26 @@ def from_jacobian(jacobian: ArrayLike, rows: Sequence[int] | None = None) -> Arr
 
 
 def from_flags(free: ArrayLike, d: int) -> Array:
-    """Projections (N, d, d) from a flag a sample (N,): the identity where it says "free", else not known (NaN).
+    """Make projections from flags that say where a sample was free.
 
-    free: booleans, or numbers of which 0 says "not free" and anything else "free". d: number of actions.
+    Parameters
+    ----------
+    free : array_like of shape (N,)
+        Booleans, or numbers of which 0 says "not free" and anything else "free".
+    d : int
+        Number of actions.
 
-    Raises `DataError` if it is not one number a sample.
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        The identity where the sample was free, all NaN where it was not: its constraint is not known.
+
+    Raises
+    ------
+    DataError
+        If there is not one number a sample.
     """
-    flags = _numbers("the free flags", free)
+    flags = _check_not_infinite("the free flags", free)
     if flags.ndim != 1:
         raise DataError(f"the free flags must be one a sample, (samples,), got shape {flags.shape}")
     if np.isnan(flags).any():
@@ -84,13 +116,26 @@ def from_flags(free: ArrayLike, d: int) -> Array:
 
 
 def first_known(*projections: ArrayLike) -> Array:
-    """For each sample the first of several projections, each (N, d, d), that is known; NaN where none is.
+    """Choose for each sample the first of several projections that is known.
 
-    Raises `DataError` if none are given or their shapes differ.
+    Parameters
+    ----------
+    *projections : array_like of shape (N, d, d)
+        Of the same samples; all NaN where not known.
+
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        Nullspace projections, all NaN where none is known.
+
+    Raises
+    ------
+    DataError
+        If none are given or their shapes differ.
     """
     if not projections:
         raise DataError("there are no projections to choose from: give at least one array (N, d, d)")
-    first, *others = (np.asarray(N, dtype=np.float64) for N in projections)
+    first, *others = (check_numbers(N, "projections") for N in projections)
     chosen = first.copy()
     for other in others:
         if other.shape != chosen.shape:
@@ -102,9 +147,27 @@ def first_known(*projections: ArrayLike) -> Array:
     return chosen
 
 
-def checked_jacobians(jacobian: ArrayLike, samples: int, m: int) -> Array:
-    """Jacobians as an (N, m, d) finite array, for N samples of m components. Raises `DataError` otherwise."""
-    J = _numbers("the Jacobian", jacobian)
+def check_jacobians(jacobian: ArrayLike, samples: int, m: int) -> Array:
+    """Check task Jacobians, one a sample.
+
+    Parameters
+    ----------
+    jacobian : array_like of shape (N, m, d)
+        From actions to the velocities of m components.
+    samples, m : int
+        Number N of samples, and m.
+
+    Returns
+    -------
+    ndarray of shape (N, m, d)
+        The Jacobians.
+
+    Raises
+    ------
+    DataError
+        If they are of another shape or not finite.
+    """
+    J = _check_not_infinite("the Jacobian", jacobian)
     if J.ndim != 3 or J.shape[:2] != (samples, m):
         raise DataError(
             f"the Jacobian must be ({samples}, {m}, actions), one a sample and a row for each of the {m} components, "
@@ -117,13 +180,10 @@ def checked_jacobians(jacobian: ArrayLike, samples: int, m: int) -> Array:
     return J
 
 
-def _numbers(what: str, values: ArrayLike) -> Array:
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise DataError(f"{what} must be an array of numbers ({error})") from error
+def _check_not_infinite(what: str, values: ArrayLike) -> Array:
+    array = check_numbers(values, what)
     if np.isinf(array).any():
         raise DataError(
-            f"{what} have an infinite value at index {tuple(np.argwhere(np.isinf(array))[0].tolist())}"
+            f"{what}: there is an infinite value at index {tuple(np.argwhere(np.isinf(array))[0].tolist())}"
         )
     return array

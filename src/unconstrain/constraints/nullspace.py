@@ -13,19 +13,19 @@ NEGLIGIBLE_ROW = 1e-14
 
 
 def projection(A: ArrayLike) -> NDArray[np.float64]:
-    """Nullspace projection ``N = I - A⁺A`` of one constraint matrix, or of one per sample.
+    """Compute the nullspace projection ``N = I - A⁺A`` of one constraint matrix, or of one per sample.
 
     Rows may be zero (nothing is constrained by them), of any length, or depend on one another; there may be
     none, or more than there are actions. Only the directions they span matter.
 
     Parameters
     ----------
-    A : array (k, d) or (N, k, d)
+    A : array_like of shape (k, d) or (N, k, d)
         Constraint rows, ``A u = 0``, over d action dimensions.
 
     Returns
     -------
-    array (d, d) or (N, d, d)
+    ndarray of shape (d, d) or (N, d, d)
         Symmetric and idempotent, with ``A N = 0`` and trace ``d - rank(A)``.
 
     Raises
@@ -40,7 +40,7 @@ def projection(A: ArrayLike) -> NDArray[np.float64]:
     radians then count alike, and so do strong and weak contacts. Rows shorter than `NEGLIGIBLE_ROW` times the
     longest are taken as zero.
     """
-    rows = _checked(A)
+    rows = _check_rows(A)
     # Scaling by the largest entry first keeps the length of very small or very large rows finite.
     largest = np.abs(rows).max(axis=-1, keepdims=True, initial=0.0)
     matters = largest > NEGLIGIBLE_ROW * largest.max(axis=-2, keepdims=True, initial=0.0)
@@ -61,16 +61,17 @@ def projection(A: ArrayLike) -> NDArray[np.float64]:
 
 
 def combine(*A: ArrayLike) -> NDArray[np.float64]:
-    """One constraint matrix that asks for all the given ones: their rows stacked.
+    """Combine constraint matrices into one that asks for all of them, by stacking their rows.
 
     Parameters
     ----------
-    *A : arrays (k_i, d) or (N, k_i, d)
+    *A : array_like of shape (k_i, d) or (N, k_i, d)
         At least one; those of a single sample hold for all samples of the others.
 
     Returns
     -------
-    array (Σ k_i, d) or (N, Σ k_i, d)
+    ndarray of shape (Σ k_i, d) or (N, Σ k_i, d)
+        All rows, those of the first matrix first.
 
     Raises
     ------
@@ -79,17 +80,17 @@ def combine(*A: ArrayLike) -> NDArray[np.float64]:
     """
     if not A:
         raise DataError("there is nothing to combine: give at least one constraint matrix")
-    parts = [_checked(part) for part in A]
+    parts = [_check_rows(part) for part in A]
     widths = sorted({part.shape[-1] for part in parts})
     if len(widths) > 1:
         raise DataError(
-            f"constraint matrices over {_listed(widths)} actions cannot be combined: "
+            f"constraint matrices over {_join(widths)} actions cannot be combined: "
             "give all of them one column per action dimension"
         )
     samples = sorted({len(part) for part in parts if part.ndim == 3})
     if len(samples) > 1:
         raise DataError(
-            f"constraint matrices of {_listed(samples)} samples cannot be combined: give one matrix per "
+            f"constraint matrices of {_join(samples)} samples cannot be combined: give one matrix per "
             "sample of the same recording, or a single one for all"
         )
     if samples:
@@ -98,12 +99,25 @@ def combine(*A: ArrayLike) -> NDArray[np.float64]:
 
 
 def unconstrained(d: int, samples: int | None = None) -> NDArray[np.float64]:
-    """The projection that changes nothing: the identity (d, d), or (samples, d, d) of them."""
+    """Make the projection that changes nothing, the identity.
+
+    Parameters
+    ----------
+    d : int
+        Number of actions.
+    samples : int, optional
+        How many of them to make.
+
+    Returns
+    -------
+    ndarray of shape (d, d) or (samples, d, d)
+        Identity matrices.
+    """
     identity = np.eye(d)
     return identity if samples is None else np.broadcast_to(identity, (samples, d, d)).copy()
 
 
-def _checked(A: ArrayLike) -> NDArray[np.float64]:
+def _check_rows(A: ArrayLike) -> NDArray[np.float64]:
     try:
         rows = np.asarray(A, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -122,5 +136,5 @@ def _checked(A: ArrayLike) -> NDArray[np.float64]:
     return rows
 
 
-def _listed(numbers: list[int]) -> str:
+def _join(numbers: list[int]) -> str:
     return " and ".join(map(str, numbers))

@@ -160,7 +160,7 @@ def _sign(rows: np.ndarray) -> np.ndarray:
 
 
 def _jackknife(parts: np.ndarray, rows: np.ndarray) -> float:
-    """Standard error (rad) of the rows (k, d): largest angles to those without one of the parts (F, d, d)."""
+    """Compute the standard error (rad) of rows (k, d): largest angles to those without one of the parts (F, d, d)."""
     if len(parts) < 2:
         return float("nan")
     _, vectors = np.linalg.eigh(parts.sum(axis=0) - parts)

@@ -6,9 +6,9 @@ of them and return a figure, as the command line saves it with `save`. matplotli
 The colours are those of Okabe and Ito, which stay apart for colour-blind readers and in greyscale.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+from unconstrain.lazy import attach
 from unconstrain.plot.saving import check_suffix, save
 
 if TYPE_CHECKING:
@@ -34,27 +34,12 @@ __all__ = [
     "trajectory",
 ]
 
-_HOME = {
-    "agreement": "policies",
-    "comparison": "policies",
-    "field": "policies",
-    "policy": "policies",
-    "policy_figure": "policies",
-    "constraint": "constraints",
-    "constraint_figure": "constraints",
-    "shares_of_motion": "constraints",
-    "identifiability_figure": "diagnostics",
-    "standard_deviation": "diagnostics",
-    "rollout_figure": "trajectories",
-    "trajectory": "trajectories",
-}
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *_HOME]
+__getattr__, __dir__ = attach(
+    __name__,
+    {
+        "unconstrain.plot.constraints": ("constraint", "constraint_figure", "shares_of_motion"),
+        "unconstrain.plot.diagnostics": ("identifiability_figure", "standard_deviation"),
+        "unconstrain.plot.policies": ("agreement", "comparison", "field", "policy", "policy_figure"),
+        "unconstrain.plot.trajectories": ("rollout_figure", "trajectory"),
+    },
+)

@@ -159,7 +159,7 @@ def _chain(seed: int) -> dict[str, float]:
     task = rng.normal(size=(1000, 1)) * np.linalg.pinv(A)[:, :, 0] * np.linalg.norm(A, axis=2)
     U = np.einsum("nij,nj->ni", projection(A), Pi) + task * np.sqrt(np.mean(Pi**2))
     chain = ConstraintChain(ConstantConstraint(1), ParametricPolicy(), NullspaceComponent())
-    ways = {
+    ways: dict[str, Any] = {
         "component, constraint, policy": chain.fit(X, U, conditions=condition),
         "inconsistency": ParametricPolicy().fit(X, U),
         "direct": ParametricPolicy(risk="direct").fit(X, U),
@@ -200,7 +200,7 @@ def _felt(seed: int) -> dict[str, Any]:
     result: dict[str, Any] = {"unknown": float(np.mean(np.isnan(N[:, 0, 0])))}
     for name, known in (("inconsistency", None), ("forces", N[seen])):
         found = select_policy(
-            {key: clone(each).set_params(risk="auto") for key, each in arm_trials.candidates().items()},
+            arm_trials.candidates(),
             train.states,
             train.actions,
             groups=train.episodes,

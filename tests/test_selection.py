@@ -117,7 +117,7 @@ def test_a_candidate_that_fails_is_listed_with_its_sentence():
     best = uc.select_policy(
         {
             "square": uc.ParametricPolicy(uc.DecoupledFeatures()),
-            "known": uc.ParametricPolicy(risk="constrained"),
+            "risky": uc.ParametricPolicy(risk="none"),
             "broken": uc.ParametricPolicy(SplineTransformer(n_knots=1)),
             "line": uc.ParametricPolicy(),
         },
@@ -129,9 +129,9 @@ def test_a_candidate_that_fails_is_listed_with_its_sentence():
     assert best.name == "line"
     assert best.policy.predict(X).shape == (len(X),)
     assert "as many actions as states" in best.table["square"].problem
-    assert "needs the projections" in best.table["known"].problem
+    assert "risk must be one of" in best.table["risky"].problem
     assert best.table["broken"].problem
-    assert done == ["square", "known", "broken", "line"]
+    assert done == ["square", "risky", "broken", "line"]
     text = str(best)
     assert text.startswith("| candidate")
     assert "square: DecoupledFeatures needs" in text
@@ -140,14 +140,14 @@ def test_a_candidate_that_fails_is_listed_with_its_sentence():
 
 
 def test_candidates_are_left_alone_and_named_apart():
-    policies = [uc.ParametricPolicy(), uc.ParametricPolicy(), uc.LocallyLinearPolicy(alpha="cv")]
+    policies = [uc.ParametricPolicy(), uc.ParametricPolicy(), uc.LocallyLinearPolicy(n_centers=9)]
     table = uc.select_policy(policies, X[:200], U[:200], EPISODES[:200], n_jobs=2).table
     assert {row.name for row in table} == {
         "ParametricPolicy()",
         "ParametricPolicy() (2)",
-        "LocallyLinearPolicy(alpha='cv')",
+        "LocallyLinearPolicy(n_centers=9)",
     }
-    assert not any(hasattr(policy, "moments_") for policy in policies)
+    assert not any(hasattr(policy, "solution_") for policy in policies)
     assert [row.inconsistency for row in table] == sorted(row.inconsistency for row in table)
 
 

@@ -2,35 +2,36 @@
 
 Every candidate is fitted once, its samples added up by fold. Leaving a fold out is a subtraction of its moments, so
 the solution without fold k, with λ chosen anew among the other folds, costs no second pass over the data. Its
-predictions for the episodes of fold k are held against their actions, and all folds' errors are pooled:
+predictions for the episodes of fold k are compared with their actions, and all folds' errors are pooled:
 
-    E_i = 1/N Σ_k Σ_(n in fold k) (r_n - û_nᵀ pi_(without k)(x_n))²
+    E_i = 1/N Σ_k Σ_(n in fold k) (r_n - û_nᵀ π_(without k)(x_n))²
 
 The folds are the same for all candidates. What features take from the states alone (centres, knots, ranges) they
-take from all of them, as one fit does; nothing of a held-out action enters. No true policy is asked for: that the
-least inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that
-no episode ever moved in are not judged. Where projections of some samples are known, their error is that under the
-constraint (`metrics.inconsistency` with projections), which judges more of the policy.
+take from all of them, as one fit does; nothing of a held-out action enters. No true policy is used: that the least
+inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that no
+episode ever moved in are not judged. Where projections of some samples are known, their error is that under the
+constraint, which judges more of the policy.
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
-import joblib
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import clone
-from sklearn.preprocessing import SplineTransformer
 
 from unconstrain import metrics
 from unconstrain.arrays import check_actions, check_groups, check_number, check_projections, check_samples
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
-from unconstrain.fitting import solve as selection
-from unconstrain.fitting.observation import errors as squared_errors
-from unconstrain.fitting.observation import sight
-from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
+from unconstrain.fitting.observation import observe, squared_errors
+from unconstrain.fitting.solve import splits
 from unconstrain.policies.base import Policy
+from unconstrain.policies.locally_linear import LocallyLinearPolicy
+from unconstrain.policies.parametric import ParametricPolicy
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
@@ -45,12 +46,24 @@ OF_WHAT_IS_KNOWN = "held-out error of what is known"
 class Row:
     """One candidate's line of the comparison.
 
-    inconsistency: pooled over held-out samples, in squared units of the action; NaN where the candidate failed. With
-        projections given it is `metrics.inconsistency` with projections.
-    standard_error: of that, over folds. Candidates share the folds, so differences are surer than it says.
-    explained: share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
-    alpha: λ, as chosen on all the data. n_parameters: of all actions together. seconds: to fit and to hold out.
-    problem: the sentence that says why the candidate could not be fitted, else None.
+    Parameters
+    ----------
+    name : str
+    inconsistency : float
+        Pooled over held-out samples, in squared units of the action; NaN where the candidate failed. Where projections
+        are known it is the error under them.
+    standard_error : float
+        Of the inconsistency, over folds. Candidates share the folds, so differences are surer than it says.
+    explained : float
+        Share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
+    alpha : float
+        λ, as chosen on all the data.
+    n_parameters : int
+        Of all actions together, of each local model.
+    seconds : float
+        To fit and to hold out.
+    problem : str, optional
+        Why the candidate could not be fitted.
     """
 
     name: str
@@ -65,9 +78,14 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """The comparison: rows with the least inconsistent candidate first, and the failed ones last.
+    """The comparison.
 
-    measure: what the candidates are judged by, in words.
+    Parameters
+    ----------
+    rows : tuple of Row
+        The least inconsistent candidate first, and the failed ones last.
+    measure : str
+        What the candidates are judged by.
     """
 
     rows: tuple[Row, ...]
@@ -76,7 +94,7 @@ class Table:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Row]:
         return iter(self.rows)
 
     def __getitem__(self, name: str) -> Row:
@@ -99,68 +117,111 @@ class Table:
 
 @dataclass(frozen=True)
 class Selection:
-    """What `select_policy` found: `policy`, fitted to all the data; its `name`; and the comparison, `table`."""
+    """What `select_policy` found.
+
+    Parameters
+    ----------
+    policy : Policy
+        The chosen one, fitted to all the data.
+    name : str
+        Its name.
+    table : Table
+        The comparison.
+    policies : dict
+        All candidates that could be fitted, fitted to all the data, by name.
+    """
 
     policy: Policy
     name: str
     table: Table
     policies: dict[str, Policy] = field(repr=False)
-    """All candidates that could be fitted, fitted to all the data, by name."""
 
     def __str__(self) -> str:
         return f"{self.table}\n\nchosen: {self.name}"
 
 
 def candidates(n: int, d: int) -> dict[str, Policy]:
-    """The candidates of "auto" for n states and d actions, all with λ by held-out inconsistency.
+    """The candidates of "auto", all with λ chosen by held-out inconsistency.
 
     Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
     even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
+
+    Parameters
+    ----------
+    n, d : int
+        Numbers of states and actions.
+
+    Returns
+    -------
+    dict of Policy
+        By name.
     """
+    from sklearn.preprocessing import SplineTransformer
+
     # Each local model solves for d (n + 1) numbers by itself, which costs their cube.
     models = np.clip(MOST_PARAMETERS**3 // (d * (n + 1)) ** 3, 1, MOST_CENTERS)
     centers = np.clip(MOST_PARAMETERS // d, 2, MOST_CENTERS)
     named: dict[str, Policy] = {
-        "linear": ParametricPolicy(alpha="cv"),
-        "locally linear": LocallyLinearPolicy(n_centers=int(models), alpha="cv"),
-        "RBF": ParametricPolicy(NormalizedRBF(int(centers)), alpha="cv"),
+        "linear": ParametricPolicy(),
+        "locally linear": LocallyLinearPolicy(n_centers=int(models)),
+        "RBF": ParametricPolicy(NormalizedRBF(int(centers))),
     }
     knots = min(7, MOST_PARAMETERS // (n * d) - 2)
     if knots >= 2:
-        splines = SplineTransformer(n_knots=knots, extrapolation="linear")
-        named["splines"] = ParametricPolicy(splines, alpha="cv")
+        named["splines"] = ParametricPolicy(SplineTransformer(n_knots=knots, extrapolation="linear"))
     if n == d:
-        named["decoupled"] = ParametricPolicy(DecoupledFeatures(), alpha="cv")
+        named["decoupled"] = ParametricPolicy(DecoupledFeatures())
         if n * FINE_KNOTS <= MOST_PARAMETERS:  # for policies with a corner, such as ∇|x|^1.5
-            named["decoupled, fine"] = ParametricPolicy(DecoupledFeatures(FINE_KNOTS), alpha="cv")
-        named["potential"] = ParametricPolicy(PotentialFeatures(NormalizedRBF(2 * MOST_CENTERS)), alpha="cv")
+            named["decoupled, fine"] = ParametricPolicy(DecoupledFeatures(FINE_KNOTS))
+        named["potential"] = ParametricPolicy(PotentialFeatures(NormalizedRBF(2 * MOST_CENTERS)))
     return named
 
 
 def select_policy(
     candidates: str | Sequence[Policy] | Mapping[str, Policy],
-    X,
-    U,
-    groups=None,
+    X: ArrayLike | Demonstrations,
+    U: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
     *,
-    projections=None,
+    projections: ArrayLike | None = None,
     n_jobs: int | None = None,
     progress: Callable[[Row], None] | None = None,
 ) -> Selection:
     """The candidate with the least inconsistency on held-out episodes, fitted to all the data.
 
-    candidates: policies in a list (each named after itself) or in a dict by name, or "auto" for those that
+    Parameters
+    ----------
+    candidates : "auto", or list or dict of Policy
+        Policies in a list are named after themselves, in a dict by their keys; "auto" stands for those that
         `candidates(n, d)` makes. They are cloned, never changed.
-    X (N, n), U (N, d): states and actions. groups (N,): episodes, which are held out whole; without them contiguous
-        blocks are.
-    projections: N (N, d, d), what is known of the constraints, all NaN where it is not; candidates are then judged by
-        `metrics.inconsistency` with projections, and those whose risk is "auto" or "constrained" learn from it.
-    n_jobs: candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
-    progress: called with each candidate's `Row` once it is done, in the order given.
+    X : array (N, n), or Demonstrations
+        States. Demonstrations bring their actions, episodes and known projections.
+    U : array (N, d)
+        Actions.
+    groups : array (N,), optional
+        Episodes, which are held out whole; without them contiguous blocks are.
+    projections : array (N, d, d), optional
+        The nullspace projections, all NaN where one is not known. Candidates are then judged by the error under them,
+        and those with the risk "inconsistency" learn from them.
+    n_jobs : int, optional
+        Candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
+    progress : callable, optional
+        Called with each candidate's `Row` once it is done, in the order given.
 
-    A candidate that cannot be fitted to these data is listed with the reason. Raises `PolicyError` where none is
-    left or where a candidate is not a policy, and `DataError` for bad arrays, one episode alone, or no motion.
+    Returns
+    -------
+    Selection
+        A candidate that cannot be fitted to these data is listed with the reason.
 
+    Raises
+    ------
+    PolicyError
+        None of the candidates can be fitted, or one is not a policy.
+    DataError
+        The arrays do not fit together, there is one episode alone, or nothing moves.
+
+    Examples
+    --------
     >>> import numpy as np, unconstrain as uc
     >>> X = np.random.default_rng(0).normal(size=(200, 2))
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
@@ -168,13 +229,20 @@ def select_policy(
     >>> uc.select_policy("auto", X, U).name
     'decoupled'
     """
+    import joblib
+
+    if isinstance(X, Demonstrations):
+        demos = X
+        groups = demos.episodes if groups is None and demos.n_episodes > 1 else groups
+        projections = demos.projections if projections is None else projections
+        X, U = demos.states, demos.actions
     X, _ = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
     named = _named(candidates, X.shape[1], actions.shape[1])
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
     # What no candidate could be judged on is told here, as the mistake it is, and not as each one's failure.
-    next(selection.splits(len(X), groups))
+    next(splits(len(X), groups))
     metrics.explained(actions, np.zeros_like(actions))
 
     parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
@@ -221,22 +289,28 @@ def _named(given, n: int, d: int) -> dict[str, Policy]:
     return named
 
 
-def _judge(name: str, policy: Policy, X, U, groups, projections) -> tuple[Row, Policy | None]:
+def _judge(
+    name: str,
+    policy: Policy,
+    X: np.ndarray,
+    U: Any,
+    groups: np.ndarray | None,
+    projections: np.ndarray | None,
+) -> tuple[Row, Policy | None]:
     start = time.perf_counter()
     try:
-        taken = projections if policy.risk in ("auto", "constrained") else None
-        fitted, predictions, fold = _hold_out(policy, X, U, groups, taken)
-        actions = check_actions(U)
-        seen = sight("auto", actions, projections)
-        errors = squared_errors(seen, predictions)
+        known = None if policy.risk == "direct" else projections
+        fitted, predictions, fold = _hold_out(policy, X, U, groups, known)
+        observation = observe("inconsistency", check_actions(U), projections)
+        errors = squared_errors(observation, predictions)
         means = np.array([errors[fold == k].mean() for k in np.unique(fold)])
         row = Row(
             name,
             inconsistency=float(errors.mean()),
             standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
-            explained=1.0 - float(errors.sum() / seen.squares.sum()),
+            explained=1.0 - float(errors.sum() / observation.squares.sum()),
             alpha=fitted.alpha_,
-            n_parameters=next(part.g.size for part in fitted.moments_ if part is not None),
+            n_parameters=fitted.solution_.w.size,
             seconds=time.perf_counter() - start,
         )
     except ValueError as error:  # ours, and those of transformers from elsewhere
@@ -245,25 +319,29 @@ def _judge(name: str, policy: Policy, X, U, groups, projections) -> tuple[Row, P
     return row, fitted
 
 
-def _hold_out(policy: Policy, X, U, groups, projections) -> tuple[Policy, np.ndarray, np.ndarray]:
+def _hold_out(
+    policy: Policy, X: np.ndarray, U: Any, groups: np.ndarray | None, projections: np.ndarray | None
+) -> tuple[Policy, np.ndarray, np.ndarray]:
     """The policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
     if policy.alpha != "cv":  # `fit` does not get to see it
         check_number(policy.alpha, "alpha", positive=False)
     fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)
     if policy.alpha != "cv":  # the folds are needed all the same, the choice is not
         fitted = fitted.set_params(alpha=policy.alpha).solved()
-    fold = fitted.folds_.assign(groups, len(X))
+    accumulator = fitted.resume()
+    assert accumulator.folds is not None
+    fold = accumulator.folds.assign(groups, len(X))
     predictions = np.empty((len(X), fitted.n_actions_))
-    seen = [k for k, part in enumerate(fitted.moments_) if part is not None]
-    for k in np.unique(fold):
-        if policy.alpha == "cv" and len(seen) - (k in seen) < 2:
+    present = [k for k, part in enumerate(accumulator.total.moments) if part is not None]
+    for k in np.unique(fold).tolist():
+        if policy.alpha == "cv" and len(present) - (k in present) < 2:
             # One fold is left, and λ is chosen within it.
             train = fold != k
             several = groups is not None and len(np.unique(groups[train])) > 1
             left = clone(policy).fit(
                 X[train],
                 np.asarray(U)[train],
-                groups=groups[train] if several else None,
+                groups=groups[train] if several and groups is not None else None,
                 projections=None if projections is None else projections[train],
             )
         else:

@@ -6,6 +6,7 @@ import unconstrain as uc
 from tests import written
 from tests.scaling import test_stream_known as known
 from tests.scaling.test_stream import EPISODES, TIME, U, X, assert_same_fit
+from unconstrain.fitting.accumulator import Accumulator
 
 COLUMNS = ("--state", "x0,x1,x2", "--action", "u0,u1,u2", "--episode", "episode_index")
 
@@ -104,19 +105,19 @@ def test_files_that_uc_save_wrote_need_no_more_than_the_columns_that_tell(run, t
     code, out, err = run("fit", "saved", "--model", "linear", "--free", "free")
     assert code == 0, err
     assert f"constraints: known of {demos.free.mean():.1%} of the samples" in out
-    assert uc.load_policy("policy.skops").risk == "auto"
+    assert uc.load_policy("policy.skops").n_known_constraints_ == demos.free.sum()
 
 
 def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):
-    tally, calls = uc.ParametricPolicy._tally, []
+    sums, calls = Accumulator.sums, []
 
     def interrupted(self, *args, **kwargs):
         calls.append(1)
         if len(calls) == 1:
             raise KeyboardInterrupt  # which is what the main thread sees when it asks for the result
-        return tally(self, *args, **kwargs)
+        return sums(self, *args, **kwargs)
 
-    monkeypatch.setattr(uc.ParametricPolicy, "_tally", interrupted)
+    monkeypatch.setattr(Accumulator, "sums", interrupted)
     arguments = ("fit", folder, *COLUMNS, "--model", "linear", "--checkpoint", "run.npz")
     code, _, err = run(*arguments)
     assert code == 130

@@ -1,5 +1,7 @@
 """What recordings determine: 0 <= H <= G, the bounds, directions never seen, advice, and what it says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,18 +14,18 @@ from tests.problems import problems
 from unconstrain import limit_cycle as toy
 from unconstrain.diagnostics.information import of_recordings
 from unconstrain.diagnostics.spectrum import directions
-from unconstrain.fitting.posterior import Unsure
 from unconstrain.motion import moving
+from unconstrain.policies.unsure import Unsure
 
 
 def policies(X):
     centers, width = X[:3].copy(), 2.0 * float(np.std(X)) + 1e-3
     return [
-        uc.ParametricPolicy(),
-        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width)),
-        uc.ParametricPolicy(SplineTransformer(4)),
-        uc.LocallyLinearPolicy(centers=centers, width=width),
-        uc.ParametricPolicy(uc.DecoupledFeatures(4)),
+        uc.ParametricPolicy(alpha=1e-6),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width), alpha=1e-6),
+        uc.ParametricPolicy(SplineTransformer(4), alpha=1e-6),
+        uc.LocallyLinearPolicy(centers=centers, width=width, alpha=1e-6),
+        uc.ParametricPolicy(uc.DecoupledFeatures(4), alpha=1e-6),
     ]
 
 
@@ -74,7 +76,7 @@ def test_moments_alone_tell_the_same(problem, weighted):
 def test_projections_show_more_and_their_moments_ask_for_the_recordings():
     demos = toy.demonstrate(3, random_state=0)
     N = uc.constraints.unconstrained(2, len(demos.states))
-    policy = uc.ParametricPolicy().fit(demos.states, demos.policy, projections=N)
+    policy = uc.ParametricPolicy(alpha=1e-6).fit(demos.states, demos.policy, projections=N)
     report = uc.identifiability(policy, demos.states, demos.policy, projections=N)
     np.testing.assert_allclose(report.spectrum, 1.0)
     with pytest.raises(uc.errors.PolicyError, match="give the recordings"):
@@ -94,22 +96,20 @@ def test_bounds_hold_for_policies_in_the_span(seed, d, off):
     if not np.any(U):
         return
     for policy in (
-        uc.ParametricPolicy(),
-        uc.ParametricPolicy(SplineTransformer(3, degree=1)),
-        uc.LocallyLinearPolicy(n_centers=3),
+        uc.ParametricPolicy(alpha=1e-6),
+        uc.ParametricPolicy(SplineTransformer(3, degree=1), alpha=1e-6),
+        uc.LocallyLinearPolicy(n_centers=3, alpha=1e-6),
     ):
         policy.fit(X, U)
-        for name in ("weights_", "coef_"):
-            if hasattr(policy, name):
-                setattr(
-                    policy, name, getattr(policy, name) + off * rng.normal(size=getattr(policy, name).shape)
-                )
+        w = policy.solution_.w
+        policy.solution_ = replace(policy.solution_, w=w + off * rng.normal(size=w.shape))
         report = uc.identifiability(policy, X, U)
         counted = moving(U)
         error = uc.metrics.unconstrained_policy_error(Pi[counted], policy.predict(X)[counted])
         assert error <= report.bound * (1 + 1e-6) + 1e-12
-    policy = uc.ParametricPolicy().fit(X, U)
-    policy.weights_ = policy.weights_ + off * rng.normal(size=policy.weights_.shape)
+    policy = uc.ParametricPolicy(alpha=1e-6).fit(X, U)
+    w = policy.solution_.w
+    policy.solution_ = replace(policy.solution_, w=w + off * rng.normal(size=w.shape))
     report = uc.identifiability(policy, X, U)
     (one,) = directions(report.information)
     true = np.hstack([W.T, np.zeros((d, 1))]).ravel()
@@ -126,7 +126,7 @@ def test_directions_never_seen_are_found_in_any_frame():
     R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     X = rng.normal(size=(300, 3))
     U = (rng.normal(size=(300, 3)) * [1.0, 0.5, 0.0]) @ R.T
-    report = uc.identifiability(uc.ParametricPolicy().fit(X, U), X, U)
+    report = uc.identifiability(uc.ParametricPolicy(alpha=1e-6).fit(X, U), X, U)
     assert report.determined_share == pytest.approx(2 / 3)
     found = report.unseen_directions(X[:20])
     np.testing.assert_allclose(np.abs(found.directions[:, 0] @ R[:, 2]), 1.0, atol=1e-9)
@@ -152,8 +152,8 @@ def test_the_determined_share_orders_the_arms_constraints():
 def test_advice_lowers_the_expected_error_as_it_says(criterion):
     demos = toy.demonstrate(4, random_state=0)
     for policy in (
-        uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.7)),
-        uc.LocallyLinearPolicy(),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.7), alpha=1e-6),
+        uc.LocallyLinearPolicy(alpha=1e-6),
     ):
         policy.fit(demos.states, demos.actions)
         report = uc.identifiability(policy, demos.states, demos.actions, groups=demos.episodes)
@@ -168,7 +168,7 @@ def test_advice_lowers_the_expected_error_as_it_says(criterion):
 
 def test_gains_are_what_a_recording_takes_away():
     demos = toy.demonstrate(4, noise=0.1, random_state=0)
-    policy = uc.ParametricPolicy().fit(demos.states, demos.actions)
+    policy = uc.ParametricPolicy(alpha=1e-6).fit(demos.states, demos.actions)
     report = uc.identifiability(policy, demos.states, demos.actions)
     X, q = demos.states[:5], np.tile([[0.6, 0.8]], (5, 1))
     gains = report.gains(X, q)
@@ -183,7 +183,7 @@ def test_episodes_hold_all_that_is_determined_and_copies_can_go():
     demos = toy.demonstrate(6, random_state=0)
     X, U = np.vstack([demos.states, demos.states]), np.vstack([demos.actions, demos.actions])
     groups = np.concatenate([demos.episodes, demos.episodes + 6])
-    for policy in (uc.ParametricPolicy(), uc.LocallyLinearPolicy(n_centers=4)):
+    for policy in (uc.ParametricPolicy(alpha=1e-6), uc.LocallyLinearPolicy(n_centers=4, alpha=1e-6)):
         report = uc.identifiability(policy.fit(X, U), X, U, groups=groups)
         found = report.contributions()
         counted = sum(np.sum(values / (values + report.threshold)) for values in report.spectra)
@@ -193,7 +193,7 @@ def test_episodes_hold_all_that_is_determined_and_copies_can_go():
 
 def test_the_report_speaks_in_the_users_words():
     demos = toy.demonstrate(3, random_state=0)
-    policy = uc.LocallyLinearPolicy(n_centers=3).fit(demos.states, demos.actions)
+    policy = uc.LocallyLinearPolicy(n_centers=3, alpha=1e-6).fit(demos.states, demos.actions)
     report = uc.identifiability(policy, demos.states, demos.actions, groups=demos.episodes)
     text = report.describe(["left", "up"], ["v_left", "v_up"])
     for part in (
@@ -227,7 +227,9 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
         assert part in told
     everywhere = toy.demonstrate(40, random_state=0)
     left = everywhere.select(everywhere.states[:, 0] < 0)
-    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.5)).fit(left.states, left.actions)
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.5), alpha=1e-6).fit(
+        left.states, left.actions
+    )
     policy.save(saved, resumable=True)
     move = ["rollout", saved, "--start=-0.7,0", "--steps", "400"]  # the cycle leads to the right
     paths = ["--out", str(tmp_path / "path.csv"), "--figure", str(tmp_path / "path.png")]
@@ -240,7 +242,7 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
 
 
 X = np.random.default_rng(0).normal(size=(20, 2))
-POLICY = uc.ParametricPolicy().fit(X, X)
+POLICY = uc.ParametricPolicy(alpha=1e-6).fit(X, X)
 
 
 @pytest.mark.parametrize(
@@ -266,7 +268,7 @@ POLICY = uc.ParametricPolicy().fit(X, X)
             "criterion must be one of",
         ),
         (
-            lambda: uc.identifiability(uc.ParametricPolicy(uc.DecoupledFeatures(5)).fit(X, X)),
+            lambda: uc.identifiability(uc.ParametricPolicy(uc.DecoupledFeatures(5), alpha=1e-6).fit(X, X)),
             "do not say what full observation",
         ),
     ],

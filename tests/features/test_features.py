@@ -14,8 +14,8 @@ from sklearn.utils.estimator_checks import (
 )
 
 import unconstrain as uc
-from unconstrain.fitting import accumulate as accumulation
-from unconstrain.fitting.observation import sight
+from unconstrain.fitting.kernels import parametric, reference
+from unconstrain.fitting.observation import observe
 
 SQUARE = [
     uc.DecoupledFeatures(),
@@ -54,7 +54,7 @@ def test_what_is_seen_along_a_direction_is_that_part_of_the_policy(features, see
     rng = np.random.default_rng(seed)
     X, Q = rng.normal(size=(2, 30, n))
     fitted = clone(features).fit(X[:20], n)
-    w = rng.normal(size=fitted.n_parameters_)
+    w = rng.normal(size=fitted.along(X[:1], Q[:1]).shape[1])
     far = np.vstack([X, 3 * X[:5]])
     Q = np.vstack([Q, Q[:5]])
     seen, whole = fitted.along(far, Q) @ w, fitted.evaluate(far, w)
@@ -67,7 +67,7 @@ def test_the_policy_is_the_downhill_gradient_of_the_potential(features, seed, n)
     rng = np.random.default_rng(seed)
     X, h = rng.normal(size=(30, n)), 1e-6
     fitted = clone(features).fit(X[:20], n)
-    w = rng.normal(size=fitted.n_parameters_)
+    w = rng.normal(size=fitted.along(X[:1], X[:1]).shape[1])
     steps = h * np.eye(n)[:, None]
     differences = np.stack([fitted.potential(X - e, w) - fitted.potential(X + e, w) for e in steps], axis=1)
     actions = fitted.evaluate(X, w)
@@ -82,20 +82,16 @@ def test_potentials_stay_finite_and_flat_far_away():
 
 
 @pytest.mark.parametrize("features", SQUARE)
-@pytest.mark.parametrize("risk", ["inconsistency", "direct", "constrained"])
-def test_moments_are_those_of_the_rows(features, risk):
+@pytest.mark.parametrize("case", ["inconsistency", "direct", "known"])
+def test_moments_are_those_of_the_rows(features, case):
     rng = np.random.default_rng(0)
     X, U = rng.normal(size=(2, 50, 3))
-    N = uc.constraints.projection(rng.normal(size=(50, 1, 3))) if risk == "constrained" else None
-    fitted, seen, weights = clone(features).fit(X, 3), sight(risk, U, N), rng.random(50)
-    moments = accumulation.parametric_moments(fitted, X, seen, weights)
-    columns = [fitted.evaluate(X, w) for w in np.eye(fitted.n_parameters_)]  # Φ(x), one parameter at a time
-    V = np.einsum("nkd,ndp->nkp", seen.rows, np.stack(columns, axis=2))
-    scale = np.abs(moments.H).max()
-    np.testing.assert_allclose(moments.H, np.einsum("n,nkp,nkq->pq", weights, V, V), atol=1e-11 * scale)
-    np.testing.assert_allclose(
-        moments.g[:, 0], np.einsum("n,nkp,nk->p", weights, V, seen.targets), atol=1e-11 * scale
-    )
+    N = uc.constraints.projection(rng.normal(size=(50, 1, 3))) if case == "known" else None
+    observation = observe("direct" if case == "direct" else "inconsistency", U, N)
+    fitted, weights = clone(features).fit(X, 3), rng.random(50)
+    moments, expected = (way.moments(fitted, X, observation, weights) for way in (parametric, reference))
+    np.testing.assert_allclose(moments.H, expected.H, atol=1e-11 * np.abs(expected.H).max())
+    np.testing.assert_allclose(moments.g, expected.g, atol=1e-11 * np.abs(expected.H).max())
 
 
 @pytest.mark.parametrize(("p", "reach"), [(1.5, 0.02), (1.8, 0.002)])

@@ -6,109 +6,114 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from tests.problems import problems
 from unconstrain.features import FullFeatures
-from unconstrain.fitting import accumulate as accumulation
-from unconstrain.fitting.accumulate import local_moments, parametric_moments
+from unconstrain.fitting.kernels import local, parametric, reference
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import RISKS, sight
+from unconstrain.fitting.observation import RISKS, observe
 from unconstrain.receptive import activations
+
+CASES = st.sampled_from([*RISKS, "known"])
+"""A risk, or the inconsistency with all projections known."""
 
 
 class Rows:
-    """The same full features, but hiding that they are, so that moments are summed row by row."""
+    """The same full features, without the capability `basis`, so that moments are summed row by row."""
 
     def __init__(self, full):
-        self.full, self.n_parameters_ = full, full.n_parameters_
+        self.full = full
+
+    def fit(self, X, d):
+        self.full.fit(X, d)
 
     def along(self, X, directions):
         return self.full.along(X, directions)
 
+    def evaluate(self, X, w):
+        return self.full.evaluate(X, w)
 
-def dense(features, X, seen, weights):
-    """H, g, s written as the equations stand."""
-    k = seen.targets.shape[1]
-    V = np.stack([features.along(X, seen.rows[:, i]) for i in range(k)], axis=1)
-    return (
-        np.einsum("n,nkp,nkq->pq", weights, V, V),
-        np.einsum("n,nkp,nk->p", weights, V, seen.targets),
-        np.einsum("n,nk,nk->", weights, seen.targets, seen.targets),
-    )
+
+def observation_of(case, U, N):
+    return observe("direct" if case == "direct" else "inconsistency", U, N if case == "known" else None)
+
+
+def assert_same_moments(moments, expected):
+    for field in ("H", "g", "squares", "weight"):
+        a, b = getattr(moments, field), getattr(expected, field)
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12 * np.abs(b).max())
 
 
 @settings(deadline=None)
-@given(problems(), st.sampled_from(["inconsistency", "constrained"]))
-def test_moments_are_the_sums_they_are_defined_as(problem, name):
+@given(problems(), st.sampled_from(["inconsistency", "known"]))
+def test_moments_are_the_sums_they_are_defined_as(problem, case):
     X, _, N, U, rng = problem
     features = FullFeatures(PolynomialFeatures(2)).fit(X, U.shape[1])
-    seen, weights = sight(name, U, N), rng.random(len(X))
-    H, g, s = dense(features, X, seen, weights)
-    for way in (features, Rows(features)):
-        moments = parametric_moments(way, X, seen, weights)
-        np.testing.assert_allclose(moments.H, H, rtol=1e-9, atol=1e-12 * abs(H).max())
-        np.testing.assert_allclose(moments.g[:, 0], g, rtol=1e-9, atol=1e-12 * abs(g).max())
-        np.testing.assert_allclose(moments.squares, s, rtol=1e-9)
-        np.testing.assert_allclose(moments.weight, weights.sum(), rtol=1e-12)
+    observation, weights = observation_of(case, U, N), rng.random(len(X))
+    expected = reference.moments(features, X, observation, weights)
+    for way in (parametric.of_products, parametric.of_rows):
+        assert_same_moments(way(features, X, observation, weights), expected)
+    assert_same_moments(parametric.moments(features, X, observation, weights), expected)
+    assert_same_moments(parametric.moments(Rows(features), X, observation, weights), expected)
 
 
 @settings(deadline=None)
-@given(problems(), st.sampled_from(RISKS))
-def test_local_moments_are_parametric_moments_weighted(problem, name):
+@given(problems(), CASES, st.sampled_from([None, PolynomialFeatures(2)]), st.booleans())
+def test_local_moments_are_parametric_moments_weighted(problem, case, transformer, with_basis):
     X, _, N, U, rng = problem
-    linear = FullFeatures().fit(X, U.shape[1])
+    full = FullFeatures(transformer).fit(X, U.shape[1])
+    features = full if with_basis else Rows(full)
     centers, width = X[rng.integers(len(X), size=3)], float(np.std(X))
-    seen, weights = sight(name, U, N), rng.random(len(X))
-    local = local_moments(centers, width, X, seen, weights)
+    observation, weights = observation_of(case, U, N), rng.random(len(X))
+    together = local.moments(features, centers, width, X, observation, weights)
     for m, center in enumerate(centers):
         receptive = np.exp(-np.sum((X - center) ** 2, axis=1) / (2 * width**2))
-        alone = parametric_moments(linear, X, seen, weights * receptive)
-        np.testing.assert_allclose(local.H[m], alone.H, rtol=1e-9, atol=1e-12 * abs(alone.H).max())
-        np.testing.assert_allclose(local.g[m], alone.g, rtol=1e-9, atol=1e-12 * abs(alone.g).max())
-        np.testing.assert_allclose(local.squares[m], alone.squares, rtol=1e-9)
+        alone = parametric.moments(features, X, observation, weights * receptive)
+        np.testing.assert_allclose(together.H[m], alone.H, rtol=1e-9, atol=1e-12 * abs(alone.H).max())
+        np.testing.assert_allclose(together.g[m], alone.g, rtol=1e-9, atol=1e-12 * abs(alone.g).max())
+        np.testing.assert_allclose(together.squares[m], alone.squares, rtol=1e-9)
+        np.testing.assert_allclose(together.weight[m], alone.weight, rtol=1e-9)
 
 
 def test_models_far_from_a_block_are_left_out_of_it_and_nothing_changes(monkeypatch):
     rng, N = np.random.default_rng(0), 20_000  # several blocks
     X = np.linspace(0, 400, N)[:, None] + rng.normal(size=(N, 2))  # one long movement
     U, centers = rng.normal(size=(N, 2)), X[::1000].copy()
-    seen = sight("inconsistency", U)
-    local = local_moments(centers, 1.0, X, seen)
-    V = seen.rows[:, 0, :, None] * np.column_stack([X, np.ones(N)])[:, None]
-    V = V.reshape(N, -1)
+    observation, linear = observe("inconsistency", U), FullFeatures().fit(X, 2)
+    together = local.moments(linear, centers, 1.0, X, observation)
     for m, center in enumerate(centers):
         receptive = np.exp(-np.sum((X - center) ** 2, axis=1) / 2)
-        H = V.T @ (V * receptive[:, None])
-        np.testing.assert_allclose(local.H[m], H, rtol=1e-12, atol=1e-14 * abs(H).max())
-    in_sight = activations(X[: N // 4], centers, 1.0).max(axis=0) > accumulation.NEGLIGIBLE
-    assert 0 < np.count_nonzero(in_sight) < len(centers)
-    monkeypatch.setattr(accumulation, "NEGLIGIBLE", 2.0)  # which leaves out every model
-    assert not local_moments(centers, 1.0, X, seen).H.any()
+        H = reference.moments(linear, X, observation, receptive).H
+        np.testing.assert_allclose(together.H[m], H, rtol=1e-12, atol=1e-14 * abs(H).max())
+    near = activations(X[: N // 4], centers, 1.0).max(axis=0) > local.NEGLIGIBLE
+    assert 0 < np.count_nonzero(near) < len(centers)
+    monkeypatch.setattr(local, "NEGLIGIBLE", 2.0)  # which leaves out every model
+    assert not local.moments(linear, centers, 1.0, X, observation).H.any()
 
 
 @settings(deadline=None)
-@given(problems(min_samples=4), st.sampled_from(RISKS), st.floats(0.1, 0.9))
-def test_moments_of_two_parts_add_to_those_of_the_whole(problem, name, share):
+@given(problems(min_samples=4), CASES, st.floats(0.1, 0.9))
+def test_moments_of_two_parts_add_to_those_of_the_whole(problem, case, share):
     X, _, N, U, rng = problem
     features = FullFeatures().fit(X, U.shape[1])
-    seen, weights = sight(name, U, N), rng.random(len(X))
+    observation, weights = observation_of(case, U, N), rng.random(len(X))
     cut = max(1, int(share * len(X)))
-    parts = [parametric_moments(features, X[s], seen[s], weights[s]) for s in (slice(cut), slice(cut, None))]
-    whole = parametric_moments(features, X, seen, weights)
-    total = Moments.sum(parts)
-    for field in ("H", "g", "squares", "weight", "n_samples"):
-        a, b = getattr(total, field), getattr(whole, field)
-        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12 * np.max(np.abs(b)))
+    parts = [
+        parametric.moments(features, X[s], observation[s], weights[s]) for s in (slice(cut), slice(cut, None))
+    ]
+    total, whole = Moments.sum(parts), parametric.moments(features, X, observation, weights)
+    assert_same_moments(total, whole)
+    assert total.n_samples == whole.n_samples
 
 
 @settings(deadline=None)
-@given(problems(), st.sampled_from(RISKS))
-def test_risk_from_moments_is_the_risk_on_the_samples(problem, name):
+@given(problems(), CASES)
+def test_risk_from_moments_is_the_risk_on_the_samples(problem, case):
     X, _, N, U, rng = problem
     features = FullFeatures(PolynomialFeatures(2)).fit(X, U.shape[1])
-    seen, weights = sight(name, U, N), rng.random(len(X))
-    moments = parametric_moments(features, X, seen, weights)
+    observation, weights = observation_of(case, U, N), rng.random(len(X))
+    moments = parametric.moments(features, X, observation, weights)
     w = rng.normal(size=(moments.H.shape[0], 3, moments.g.shape[1]))
     for candidate in range(3):
         P = features.evaluate(X, w[:, candidate].T.reshape(-1))
-        errors = np.sum((seen.targets - np.einsum("nkd,nd->nk", seen.rows, P)) ** 2, axis=1)
+        errors = np.sum((observation.targets - np.einsum("nkd,nd->nk", observation.rows, P)) ** 2, axis=1)
         np.testing.assert_allclose(moments.risk(w)[candidate], weights @ errors, rtol=1e-6)
 
 

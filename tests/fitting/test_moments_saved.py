@@ -65,7 +65,7 @@ def test_a_resumable_policy_goes_on_where_it_stopped(tmp_path):
     fitted().save(tmp_path / "yesterday.skops", resumable=True)
     today = uc.load_policy(tmp_path / "yesterday.skops").partial_fit(X[200:], U[200:], groups=GROUPS[200:])
     both = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=GROUPS)
-    assert today.folds_.fold_of == both.folds_.fold_of
+    assert today.resume().folds.fold_of == both.resume().folds.fold_of
     np.testing.assert_allclose(today.predict(X), both.predict(X), rtol=1e-9, atol=1e-12)
 
 

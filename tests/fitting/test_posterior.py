@@ -131,7 +131,7 @@ def test_posterior_is_finite_and_positive_for_any_data(problem):
     X, _, _, U, _ = problem
     if not np.any(U):
         return
-    for policy in (uc.ParametricPolicy(), uc.LocallyLinearPolicy(n_centers=2)):
+    for policy in (uc.ParametricPolicy(alpha=1e-6), uc.LocallyLinearPolicy(n_centers=2, alpha=1e-6)):
         P, deviation = policy.fit(X, U).predict(X, return_std=True)
         assert P.shape == deviation.shape
         assert np.isfinite(deviation).all()

@@ -108,23 +108,6 @@ def test_batches_of_any_size_give_the_fit_of_all_at_once(cuts, batch_rows, which
     assert_same_known(uc.fit_stream(plain, without_groups, batch_rows=batch_rows), whole)
 
 
-def test_the_constrained_risk_where_all_is_known(tmp_path):
-    complete = np.where(np.isnan(N), np.eye(3), N)
-    flat = {f"n{j}": complete.reshape(-1, 9)[:, j] for j in range(9)}
-    folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200], more=TOUCHED | flat)
-    for policy in policies():
-        policy.set_params(risk="constrained")
-        whole = clone(policy).fit(X, U, groups=EPISODES, projections=complete)
-        assert whole.n_known_constraints_ == len(X)
-        streamed = uc.fit_stream(clone(policy), folder, **COLUMNS, **WAYS["columns"], batch_rows=90)
-        assert_same_fit(streamed, whole)
-        assert streamed.n_known_constraints_ == len(X)
-        assert_same_fit(uc.fit_stream(policy, [(X, U, EPISODES, complete)]), whole)
-    placed = uc.LocallyLinearPolicy(n_centers=6, risk="constrained")
-    whole = clone(placed).fit(X, U, projections=complete)
-    assert_same_fit(uc.fit_stream(placed, [(X, U, None, complete)]), whole)
-
-
 def test_what_uc_save_wrote_is_used_by_the_names_of_its_columns(tmp_path):
     forces = np.column_stack([TOUCHED[f"f{j}"] for j in range(3)])
     demos = uc.Demonstrations(X, U, EPISODES, forces=forces, free=TOUCHED["free"], projections=N)
@@ -182,7 +165,12 @@ def test_columns_not_needed_are_not_read(tmp_path, columns_read):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     one = {"state": ["x0"], "action": ["u1"], "episode": "episode_index"}
     uc.fit_stream(
-        uc.LocallyLinearPolicy(n_centers=2), folder, **one, force="f1", force_threshold=1.0, free="free"
+        uc.LocallyLinearPolicy(n_centers=2, alpha=1e-6),
+        folder,
+        **one,
+        force="f1",
+        force_threshold=1.0,
+        free="free",
     )
     # A first row to see what there is, a sample to place centres on, and then all.
     assert columns_read[1:] == [["x0", "u1"], ["x0", "u1", "f1", "free", "episode_index"]]
@@ -214,23 +202,16 @@ def test_an_interrupted_stream_goes_on(tmp_path, way):
 def test_a_checkpoint_belongs_to_what_was_known(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     file = tmp_path / "run.npz"
-    uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **FORCE, checkpoint=file)
+    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **FORCE, checkpoint=file)
     others = [{}, FORCE | {"force_threshold": 2.5}, FORCE | {"force": ["f1", "f0", "f2"]}, WAYS["lists"]]
     for other in [*others, FORCE | {"free": "free"}]:
         with pytest.raises(uc.errors.UnconstrainError, match="checkpoint of another source"):
-            uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **other, checkpoint=file)
+            uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **other, checkpoint=file)
     file = tmp_path / "batches.npz"
-    uc.fit_stream(uc.ParametricPolicy(), [(X, U, None, N)], checkpoint=file)
+    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U, None, N)], checkpoint=file)
     for batch in ((X, U), (X, U, None, np.full_like(N, np.nan))):
         with pytest.raises(uc.errors.UnconstrainError, match="checkpoint of another source"):
-            uc.fit_stream(uc.ParametricPolicy(), [batch], checkpoint=file)
-
-
-def test_policies_from_before_constraints_were_counted_go_on():
-    policy = uc.ParametricPolicy().fit(X[:300], U[:300])
-    del policy.n_known_constraints_
-    uc.fit_stream(policy, [(X[300:], U[300:], None, N[300:])], partial=True)
-    assert policy.n_known_constraints_ == np.count_nonzero(~np.isnan(N[300:, 0, 0]))
+            uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [batch], checkpoint=file)
 
 
 # Mistakes
@@ -268,7 +249,7 @@ LONG = pa.array([np.eye(3).ravel()[: 8 if i == 207 else 9] for i in range(len(X)
     ],
 )
 def test_broken_files_are_named(tmp_path, name, values, way, sentence):
-    policy = uc.ParametricPolicy()
+    policy = uc.ParametricPolicy(alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
         uc.fit_stream(policy, spoilt(tmp_path / "parts", name, values), **COLUMNS, **WAYS[way])
     assert "\n" not in str(caught.value)
@@ -278,38 +259,57 @@ def test_broken_files_are_named(tmp_path, name, values, way, sentence):
 @pytest.mark.parametrize(
     ("risk", "source", "options", "sentence"),
     [
-        ("auto", None, FORCE | WAYS["lists"], "projections= and force= both say"),
-        ("auto", None, WAYS["free"] | WAYS["lists"], "projections= and free= both say"),
-        ("auto", None, {"force": FORCE["force"]}, "give force_threshold, above which"),
-        ("auto", None, {"force_threshold": 2.0}, "force_threshold is for forces"),
-        ("auto", None, FORCE | {"force_threshold": 0.0}, "force threshold must be a number above zero"),
-        ("auto", None, FORCE | {"force_threshold": "2"}, "force threshold must be a number above zero"),
-        ("auto", None, FORCE | {"force": ["f0", "f1"]}, "2 force columns and 3 actions"),
-        ("auto", None, FORCE | {"force": ["f0", "f1", "fz"]}, r"no column 'fz' for force"),
-        ("auto", None, {"free": "N"}, "lists that are missing|stands for 9"),
-        ("auto", None, {"projections": ["n0", "n1"]}, "9 columns of numbers, .* stands for 2"),
-        ("auto", None, {"projections": "M"}, "no column 'M' for projections"),
-        ("inconsistency", None, FORCE, 'projections are for risk="auto" and "constrained"'),
-        ("direct", [(X, U, None, N)], {}, 'projections are for risk="auto" and "constrained"'),
-        ("constrained", None, {}, 'risk="constrained" needs the projections of the samples: name columns'),
-        ("constrained", [(X, U, EPISODES)], {}, 'risk="constrained" needs the projections of the samples'),
-        ("constrained", None, WAYS["lists"], r"the projection at row \d+ .* is not known"),
-        ("constrained", None, FORCE, "leave open the constraint of .* samples"),
-        ("constrained", [(X, U, None, N)], {}, r"batch 0 .*: the projection of row \d+ is NaN"),
-        ("auto", [(X, U)], {"projections": "N"}, "projections= chooses a column of files"),
-        ("auto", [(X, U)], {"free": "free"}, "free= chooses a column of files"),
-        ("auto", [(X, U), (X, U, None, N)], {}, "batch 1 .* has projections but the first has none"),
-        ("auto", [(X, U, None, N), (X, U)], {}, "batch 1 .* has no projections but the first has some"),
-        ("auto", [(X, U, None, N[:3])], {}, "batch 0 .*: projections must have shape"),
-        ("auto", [(X, U, None, 2 * N)], {}, r"batch 0 .*: the projection of row \d+ is none"),
-        ("auto", [(X, U, None, [["a"]] * len(X))], {}, "batch 0 .*: projections must be an array of numbers"),
-        ("auto", [("abc", U, None, N)], {}, "X of batch 0 must be an array of numbers"),
-        ("auto", [([[1.0, 2.0], [3.0]], U[:2])], {}, "X of batch 0 must be an array of numbers"),
-        ("auto", [(X, U, None, N, N)], {}, r"\(X, U\), \(X, U, groups\) or \(X, U, groups, projections\)"),
+        ("inconsistency", None, FORCE | WAYS["lists"], "projections= and force= both say"),
+        ("inconsistency", None, WAYS["free"] | WAYS["lists"], "projections= and free= both say"),
+        ("inconsistency", None, {"force": FORCE["force"]}, "give force_threshold, above which"),
+        ("inconsistency", None, {"force_threshold": 2.0}, "force_threshold is for forces"),
+        (
+            "inconsistency",
+            None,
+            FORCE | {"force_threshold": 0.0},
+            "force threshold must be a number above zero",
+        ),
+        (
+            "inconsistency",
+            None,
+            FORCE | {"force_threshold": "2"},
+            "force threshold must be a number above zero",
+        ),
+        ("inconsistency", None, FORCE | {"force": ["f0", "f1"]}, "2 force columns and 3 actions"),
+        ("inconsistency", None, FORCE | {"force": ["f0", "f1", "fz"]}, r"no column 'fz' for force"),
+        ("inconsistency", None, {"free": "N"}, "lists that are missing|stands for 9"),
+        ("inconsistency", None, {"projections": ["n0", "n1"]}, "9 columns of numbers, .* stands for 2"),
+        ("inconsistency", None, {"projections": "M"}, "no column 'M' for projections"),
+        ("direct", [(X, U, None, N)], {}, 'projections are for risk="inconsistency"'),
+        ("inconsistency", [(X, U)], {"projections": "N"}, "projections= chooses a column of files"),
+        ("inconsistency", [(X, U)], {"free": "free"}, "free= chooses a column of files"),
+        ("inconsistency", [(X, U), (X, U, None, N)], {}, "batch 1 .* has projections but the first has none"),
+        (
+            "inconsistency",
+            [(X, U, None, N), (X, U)],
+            {},
+            "batch 1 .* has no projections but the first has some",
+        ),
+        ("inconsistency", [(X, U, None, N[:3])], {}, "batch 0 .*: projections must have shape"),
+        ("inconsistency", [(X, U, None, 2 * N)], {}, r"batch 0 .*: the projection of row \d+ is none"),
+        (
+            "inconsistency",
+            [(X, U, None, [["a"]] * len(X))],
+            {},
+            "batch 0 .*: projections must be an array of numbers",
+        ),
+        ("inconsistency", [("abc", U, None, N)], {}, "X of batch 0 must be an array of numbers"),
+        ("inconsistency", [([[1.0, 2.0], [3.0]], U[:2])], {}, "X of batch 0 must be an array of numbers"),
+        (
+            "inconsistency",
+            [(X, U, None, N, N)],
+            {},
+            r"\(X, U\), \(X, U, groups\) or \(X, U, groups, projections\)",
+        ),
     ],
 )
 def test_mistakes_are_told_in_one_sentence(tmp_path, risk, source, options, sentence):
-    policy = uc.ParametricPolicy(risk=risk)
+    policy = uc.ParametricPolicy(risk=risk, alpha=1e-6)
     columns = {} if source is not None else COLUMNS
     source = source or written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
@@ -321,11 +321,14 @@ def test_mistakes_are_told_in_one_sentence(tmp_path, risk, source, options, sent
 def test_flags_may_be_booleans_or_say_so(tmp_path):
     free = np.array(TOUCHED["free"]) == 1
     whole = uc.fit_stream(
-        uc.ParametricPolicy(), spoilt(tmp_path / "ones", "free", free * 1), **COLUMNS, **WAYS["free"]
+        uc.ParametricPolicy(alpha=1e-6),
+        spoilt(tmp_path / "ones", "free", free * 1),
+        **COLUMNS,
+        **WAYS["free"],
     )
     for name, flags in [("booleans", free), ("text", free.astype(str))]:
         folder = spoilt(tmp_path / name, "free", flags)
-        policy = uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **WAYS["free"])
+        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **WAYS["free"])
         assert policy.n_known_constraints_ == whole.n_known_constraints_ == np.count_nonzero(free)
         np.testing.assert_array_equal(policy.predict(X), whole.predict(X))
         loaded = uc.load(folder / "part-0.parquet", **COLUMNS, free="free")
@@ -341,10 +344,10 @@ def test_a_file_may_know_no_projection(tmp_path, unknown):
     rows = slice(200) if unknown == 0 else slice(200, None)
     known = N.copy()
     known[rows] = np.nan
-    whole = uc.fit_stream(uc.ParametricPolicy(), [(X, U, EPISODES, known)])
+    whole = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U, EPISODES, known)])
     for nothing in (pa.nulls(len(table)), pa.array([[]] * len(table), pa.list_(pa.float64()))):
         pq.write_table(table.set_column(at, "N", nothing), path)
-        policy = uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **WAYS["lists"])
+        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **WAYS["lists"])
         assert policy.n_known_constraints_ == whole.n_known_constraints_
         np.testing.assert_allclose(policy.predict(X), whole.predict(X), rtol=1e-9)
 
@@ -356,7 +359,7 @@ def test_an_episode_that_comes_back_has_no_neighbours(tmp_path):
     with pytest.raises(
         uc.errors.DataError, match=r"goes on at row .* to filter the forces of a stream, sort it"
     ):
-        uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **FORCE, batch_rows=50)
+        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **FORCE, batch_rows=50)
     # Flags and projections say what they say, wherever their samples are.
     for way in ("free", "lists"):
-        uc.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, **WAYS[way], batch_rows=50)
+        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **WAYS[way], batch_rows=50)

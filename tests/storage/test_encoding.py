@@ -275,8 +275,16 @@ def test_hostile_trees_run_nothing_and_are_refused(tree, tmp_path, monkeypatch):
 def hidden_in_a_policy(tree):
     X = np.random.default_rng(0).normal(size=(30, 2))
     whole, _ = storage.encode(uc.ParametricPolicy(PolynomialFeatures(2)).fit(X, X))
-    whole["object"][1]["features_"]["object"][1]["transformer_"] = tree
+    inside(whole, "model_", "features")["transformer_"] = tree
     return whole
+
+
+def inside(tree, *names):
+    """The state of the object that lies at this path of attributes."""
+    state = tree["object"][1]
+    for name in names:
+        state = state[name]["object"][1]
+    return state
 
 
 @pytest.mark.parametrize(
@@ -285,12 +293,14 @@ def hidden_in_a_policy(tree):
         ("n_features_in_", 10**12),
         ("n_features_in_", "2"),
         ("n_features_in_", None),
-        ("n_actions_", 10**9),
-        ("n_actions_", 3),
-        ("weights_", None),
-        ("weights_", 3),
-        ("features_", []),
-        ("features_", {"object": ["unconstrain.NormalizedRBF", {}]}),
+        ("model_.n_actions", 10**9),
+        ("model_.n_actions", 3),
+        ("model_.features", []),
+        ("model_.features", {"object": ["unconstrain.NormalizedRBF", {}]}),
+        ("model_", None),
+        ("solution_", {"object": ["unconstrain.GlobalModel", {}]}),
+        ("solution_.w", None),
+        ("solution_.w", 3),
         ("predict", None),
         ("actions_are_scalars_", True),
         ("evaluate", "features_"),
@@ -299,7 +309,8 @@ def hidden_in_a_policy(tree):
 def test_policies_with_another_state_are_damaged(attribute, value, tmp_path):
     X = np.random.default_rng(0).normal(size=(30, 2))
     tree, arrays = storage.encode(uc.ParametricPolicy(SplineTransformer()).fit(X, X))
-    tree["object"][1][attribute] = value
+    *path, last = attribute.split(".")
+    inside(tree, *path)[last] = value
     storage.write(tmp_path / "p.skops", POLICY, {"works": True, "value": tree}, arrays)
     if attribute == "evaluate":  # an attribute that nothing asks for changes nothing
         assert uc.load_policy(tmp_path / "p.skops").predict(X).shape == X.shape
@@ -332,7 +343,20 @@ def test_states_changed_at_random_are_damaged_or_work(tmp_path_factory, data):
         node = container[key]
         if not isinstance(node, list | dict) or not node or data.draw(st.integers(0, 4)) == 0:
             break
-    changes = [None, True, -1, 0, 10**9, 10**30, 0.5, "text", [], {}, {"array": "weights_"}, {"float": "nan"}]
+    changes = [
+        None,
+        True,
+        -1,
+        0,
+        10**9,
+        10**30,
+        0.5,
+        "text",
+        [],
+        {},
+        {"array": "solution_.w"},
+        {"float": "nan"},
+    ]
     container[key] = data.draw(st.sampled_from(changes))
     path = tmp_path_factory.mktemp("changed") / "p.skops"
     storage.write(path, POLICY, {"works": True, "value": tree}, arrays)

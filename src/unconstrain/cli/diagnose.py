@@ -59,8 +59,6 @@ def diagnose(
     recordings.describe(demos)
     with working("fitting") as report:
         policy = model.build()
-        if demos.projections is not None:
-            policy.set_params(risk="auto")
         policy.fit(demos.states, demos.actions, groups=demos.folds(folds), projections=demos.projections)
         report("diagnosing")
         labels = [demos.episode_labels[code] for code in demos.episodes]

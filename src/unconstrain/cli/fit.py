@@ -118,8 +118,6 @@ def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) ->
             report(f"fitted {row.name} in {row.seconds:.1f} s")
 
         policy = None if model.is_chosen else model.build()
-        if policy is not None and demos.projections is not None:
-            policy.set_params(risk="auto")
         return compare_risks(
             policy,
             demos.states,
@@ -181,8 +179,6 @@ def _fit_stream(
 
     policy, how = model.build(), recorded.arguments()
     source = recorded.files[0] if len(recorded.files) == 1 else recorded.files
-    if recorded.tells_constraints:
-        policy.set_params(risk="auto")
     if cluster is None:
         fit_stream(policy, source, **how, checkpoint=checkpoint, progress=True)
     else:
@@ -193,10 +189,8 @@ def _fit_stream(
 
 
 def _describe_stream(policy: "Policy") -> None:
-    from unconstrain.fitting.moments import Moments
-
-    folds = getattr(policy, "folds_", None)
-    episodes = f" in {len(folds.fold_of):,} episodes" if folds is not None else ""
+    accumulator = policy.resume()
+    episodes = f" in {accumulator.folds.n_dealt:,} episodes" if accumulator.folds is not None else ""
     reporting.say(f"read: {policy.n_samples_seen_:,} samples{episodes}")
     if policy.n_known_constraints_:
         share = policy.n_known_constraints_ / policy.n_samples_seen_
@@ -204,7 +198,7 @@ def _describe_stream(policy: "Policy") -> None:
     reporting.say(f"zero actions: {policy.n_zero_actions_:,} without a direction")
     if not hasattr(policy, "held_out_risk_"):
         return
-    total = Moments.sum(part for part in policy.moments_ if part is not None)
+    total = accumulator.moments()
     error = float(policy.held_out_risk_[policy.alphas_ == policy.alpha_][0])
     motion = float(total.squares.sum() / total.weight.sum())
     each = ", of the local models each by itself" if total.weight.ndim else ""

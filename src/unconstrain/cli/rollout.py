@@ -14,7 +14,7 @@ from unconstrain.progress import working
 if TYPE_CHECKING:
     import numpy as np
 
-    from unconstrain.fitting.posterior import Unsure
+    from unconstrain.policies.unsure import Unsure
 
 
 @command(
@@ -65,8 +65,8 @@ def rollout(
     """
     outputs.check_outputs([policy], {"out": out, "figure": figure}, overwrite=overwrite)
     from unconstrain import plot
-    from unconstrain.fitting.posterior import Unsure
     from unconstrain.policies import load_policy
+    from unconstrain.policies.unsure import Unsure
     from unconstrain.recordings.text import write_csv
     from unconstrain.simulation import rollout as integrate
 

@@ -37,20 +37,20 @@ def compile_policy(policy) -> CompiledPolicy:
 
 
 def _compiled(policy) -> CompiledPolicy:
-    features = getattr(policy, "features_", None)
-    if features is None:
+    features = policy.features_
+    if hasattr(policy, "centers_"):
         return LocallyLinear(
             centers=policy.centers_, width=policy.width_, coef=policy.coef_, intercept=policy.intercept_
         )
     w = policy.weights_
     if isinstance(features, DecoupledFeatures):
         n = features.n_actions_
-        coefficients = np.zeros((n, features.n_basis_, n))
+        coefficients = np.zeros((n, w.size // n, n))
         own = w.reshape(n, -1) @ features.to_coefficients_.T
         coefficients[np.arange(n), :, np.arange(n)] = own
         return Additive(**_polynomials(features.splines_, coefficients))
     if isinstance(features, PotentialFeatures):
-        return _potential(features.basis_, w)
+        return _potential(features.transformer_, w)
     if isinstance(features, FullFeatures):
         basis, W = features.transformer_, w.reshape(features.n_actions_, -1)
         if basis is None:

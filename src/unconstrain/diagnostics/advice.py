@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unconstrain.diagnostics.information import seen_along, weights_of_models
-from unconstrain.fitting.observation import sight
+from unconstrain.fitting.observation import observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.policies.base import Policy
 
@@ -43,9 +42,8 @@ class Planner:
     def __init__(self, policy: Policy, posterior: Posterior, candidates: np.ndarray, repeats: float):
         self.policy, self.X, self.repeats = policy, candidates, repeats
         self.posterior = posterior
-        everything = sight("direct", np.zeros((len(candidates), policy.n_actions_)))
-        self.G = self._stack(policy._moments(candidates, everything).H)
-        self.P = policy._evaluate(candidates)
+        everything = observe("direct", np.zeros((len(candidates), policy.n_actions_)))
+        self.G = self._stack(policy.model_.moments(candidates, everything).H)
 
     def next(self, k: int, criterion: str) -> list[Recording]:
         """The k best, one after the other; the planner is left as if they were made."""
@@ -53,7 +51,7 @@ class Planner:
 
     def gains(self, X: np.ndarray, directions: np.ndarray, criterion: str = "A") -> np.ndarray:
         """Of recordings at X (C, n) along directions (C, d): (C,); of A in squared units, summed over candidates."""
-        V, weights = seen_along(self.policy, X, directions), weights_of_models(self.policy, X)
+        V, weights = self.policy.model_.along(X, directions), self.policy.model_.reach(X)
         total = np.zeros(len(X))
         for covariance, G, sigma2, weight in zip(
             self._covariance(), self.G, self._noise(), weights.T, strict=True
@@ -77,7 +75,7 @@ class Planner:
         )
 
     def _best(self, criterion: str) -> Recording:
-        second = self.policy._deviation(self.X, self.P, self.posterior)
+        second = self.policy.covariance(self.X, self.posterior)
         values, vectors = np.linalg.eigh(second)
         C, d = values.shape
         X, q = np.repeat(self.X, d, axis=0), vectors.swapaxes(1, 2).reshape(C * d, d)
@@ -89,7 +87,7 @@ class Planner:
 
     def record(self, x: np.ndarray, q: np.ndarray) -> None:
         """Take the recording at x (1, n) along q (1, d) into the posterior."""
-        v, weights = seen_along(self.policy, x, q)[0], weights_of_models(self.policy, x)[0]
+        v, weights = self.policy.model_.along(x, q)[0], self.policy.model_.reach(x)[0]
         left = []
         for covariance, sigma2, weight in zip(self._covariance(), self._noise(), weights, strict=True):
             s = covariance @ v

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unconstrain.diagnostics.information import Information, seen_along, stacked, weights_of_models
+from unconstrain.diagnostics.information import Information, stacked
 from unconstrain.diagnostics.spectrum import directions, shares_seen
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import Sight
+from unconstrain.fitting.observation import Observation
 from unconstrain.parallel import blocks
 from unconstrain.policies.base import Policy
 
@@ -39,21 +39,23 @@ def contributions(
     policy: Policy,
     information: Information,
     X: np.ndarray,
-    seen: Sight,
+    observation: Observation,
     weights: np.ndarray,
     episodes: np.ndarray,
     threshold: float,
 ) -> list[Contribution]:
     """Of every episode, the largest first; samples X (N, n), what is seen of them, weights (N,), episodes (N,)."""
     labels, number = np.unique(episodes, return_inverse=True)
-    held = np.bincount(number, leverages(policy, information, X, seen, weights, threshold), len(labels))
+    held = np.bincount(
+        number, leverages(policy, information, X, observation, weights, threshold), len(labels)
+    )
     order = np.argsort(held)
 
     def determined(without: int) -> float:
         rows = np.flatnonzero(np.isin(number, order[:without]))
         left = information.moments
         if len(rows):
-            dropped = stacked(policy._moments(X[rows], seen[rows], weights[rows]))
+            dropped = stacked(policy.model_.moments(X[rows], observation[rows], weights[rows]))
             left = Moments(left.H - dropped.H, left.g, left.squares, left.weight, left.n_samples)
         return float(np.mean(np.concatenate(shares_seen(Information(left, information.whole))) >= threshold))
 
@@ -73,7 +75,7 @@ def leverages(
     policy: Policy,
     information: Information,
     X: np.ndarray,
-    seen: Sight,
+    observation: Observation,
     weights: np.ndarray,
     threshold: float,
 ) -> np.ndarray:
@@ -82,9 +84,9 @@ def leverages(
     result = np.zeros(len(X))
     width = max(root.shape[1] for root in roots) + information.moments.H.shape[-1]
     for rows in blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
-        looked, reached = seen[rows].rows, weights_of_models(policy, X[rows])
-        for k in range(seen.n_rows):
-            V = seen_along(policy, X[rows], looked[:, k])
+        looked, reached = observation[rows].rows, policy.model_.reach(X[rows])
+        for k in range(observation.n_rows):
+            V = policy.model_.along(X[rows], looked[:, k])
             for root, weight in zip(roots, reached.T, strict=True):
                 result[rows] += weight * np.sum((V @ root) ** 2, axis=1)
     return result * weights

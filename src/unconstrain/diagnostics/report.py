@@ -26,12 +26,10 @@ from unconstrain.diagnostics.words import described
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import farthest_first
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import sight
+from unconstrain.fitting.observation import observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import directions as units
-from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
-from unconstrain.receptive import activations
 
 POOL = 200
 """Candidate states for the next recording, spread over the recorded ones, where none are given."""
@@ -172,14 +170,14 @@ class Identifiability:
     def posterior(self) -> Posterior:
         """Of the parameters, from these recordings: see `uncertainty`."""
         seen = self.information.moments
-        if not self._local:
+        if not self._local:  # a single model has no leading axis
             seen = Moments(seen.H[0], seen.g[0], seen.squares[0], seen.weight[0], seen.n_samples)
         return Posterior.of(seen)
 
     def covariance(self, X) -> np.ndarray:
         """How far the policy may be from `predict(X)`, second moments (N, d, d) at states X (N, n)."""
         X = check_states(self.policy, X)
-        return self.policy._deviation(X, self.policy._evaluate(X), self.posterior)
+        return self.policy.covariance(X, self.posterior)
 
     def unseen_directions(self, X, reach: float | None = None) -> Coverage:
         """Near each state of X (Q, n), the directions of motion, least seen first: see `coverage`.
@@ -208,7 +206,7 @@ class Identifiability:
         near = self.recordings_for("where the policy is known least")
         pool, radius = farthest_first(near.X, n_centers=POOL)
         covariance = self.covariance(pool)
-        speeds = np.linalg.norm(self.policy._evaluate(pool), axis=1)
+        speeds = np.linalg.norm(check_actions(self.policy.predict(pool)), axis=1)
         order = np.argsort(np.linalg.eigvalsh(covariance)[:, -1])[::-1]
         chosen: list[int] = []
         for i in order.tolist():
@@ -268,8 +266,8 @@ class Identifiability:
             raise DataError(
                 "which episodes contribute needs to know them: identifiability(policy, X, U, groups=...)"
             )
-        seen = sight("auto", near.U, near.projections)
-        args = (self.policy, self.information, near.X, seen, near.weights, near.episodes)
+        observation = observe("inconsistency", near.U, near.projections)
+        args = (self.policy, self.information, near.X, observation, near.weights, near.episodes)
         return contributions(*args, self.threshold)
 
     def __repr__(self) -> str:
@@ -292,20 +290,20 @@ class Identifiability:
 
     @property
     def _local(self) -> bool:
-        return isinstance(self.policy, LocallyLinearPolicy)
+        return self.policy.solution_.w.ndim > 1
 
     @property
     def _risks(self) -> np.ndarray:
         """E_i of the policy as it is, summed over samples, of every model (S,)."""
         seen = self.information.moments
-        w = self.policy._parameters().reshape(len(self.information), -1)
+        w = self.policy.solution_.w.reshape(len(self.information), -1)
         return seen.risk(w[:, :, None, None])[:, 0]
 
     @cached_property
     def _bounds(self) -> tuple[float, float]:
         weight = float(np.sum(self.information.moments.weight))
-        if self._local and self.recordings is not None:
-            reach = activations(self.recordings.X, self.policy.centers_, self.policy.width_)
+        if self.recordings is not None:
+            reach = self.policy.model_.reach(self.recordings.X)
             weight = float(reach.sum(axis=1).min() * np.sum(self.recordings.weights))
         return bounding.bounds(self._risks, self.spectra, weight, self.threshold)
 

@@ -1,11 +1,23 @@
 """The protocol: a policy that is linear in its parameters is a feature map seen along a direction.
 
-For any policy `pi(x) = Φ(x) w`, with `Φ` the d x P matrix of features, an observer who looks along a
-direction q sees `qᵀ pi(x) = v(x, q)ᵀ w` with `v = Φᵀ q`. Learning needs nothing but `v`; full, decoupled and
-potential features differ in nothing else.
+For any policy `π(x) = Φ(x) w`, with `Φ` the d x P matrix of features, an observer who looks along a direction q sees
+`qᵀπ(x) = v(x, q)ᵀ w` with `v = Φᵀ q`. Learning needs nothing but `v`; full, decoupled and potential features differ
+in nothing else.
+
+A feature map has three methods, and may have more. Each further method is a capability, which is there or is not:
+
+| method                          | needed | who calls it                                                            |
+| ------------------------------- | ------ | ------------------------------------------------------------------------ |
+| `fit(X, d)`                     | yes    | a policy, once, before any sample is added                                |
+| `along(X, directions)`          | yes    | everything that adds up samples or measures uncertainty                   |
+| `evaluate(X, w)`                | yes    | `predict`                                                                 |
+| `basis(X)`                      | no     | the fast ways of adding up: it says that `π(x) = W b(x)` with W free      |
+| `compile(w)`                    | no     | `policy.compile()`, for the control loop                                  |
+
+`fit` may take `sample_weight` as a third argument.
 """
 
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from sklearn.base import clone
@@ -13,41 +25,183 @@ from sklearn.utils.validation import has_fit_parameter
 
 from unconstrain.errors import PolicyError
 
+if TYPE_CHECKING:
+    from unconstrain.deploy.compiled import CompiledPolicy
+
 
 @runtime_checkable
-class PolicyFeatures(Protocol):
-    """Features of a policy that is linear in its P parameters."""
+class Features(Protocol):
+    """A feature map of P parameters, in the order in which `along` returns them."""
 
-    n_parameters_: int
-    """P, known once fitted."""
+    def fit(self, X: np.ndarray, d: int) -> Any:
+        """Fix what depends on data, such as centres and knots.
 
-    def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "PolicyFeatures":
-        """Fix what depends on data (centres, knots) from states X (N, n), for actions of dimension d."""
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        d : int
+            Dimension of the actions.
+
+        Returns
+        -------
+        self
+        """
         ...
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """`v(x, q)` for states X (N, n) and one direction each (N, d): an array V (N, P) with `V w = qᵀ pi(x)`."""
+        """The features seen along one direction at each state.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, d)
+            Of any length.
+
+        Returns
+        -------
+        array (N, P)
+            V, with `V w = qᵀπ(x)`.
+        """
         ...
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy itself, `pi(x) = Φ(x) w`: actions (N, d) at states X (N, n) for parameters w (P,)."""
+        """The policy itself.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (P,)
+            Parameters.
+
+        Returns
+        -------
+        array (N, d)
+            `π(x) = Φ(x) w`.
+        """
         ...
 
 
-def is_policy_features(candidate) -> bool:
-    """Whether `candidate`, fitted or not, speaks the protocol; the number of parameters is known only once fitted."""
-    named = all(callable(getattr(candidate, name, None)) for name in ("fit", "along", "evaluate"))
-    return named and not isinstance(candidate, type)
+@runtime_checkable
+class FullBasis(Features, Protocol):
+    """A feature map whose policy is `π(x) = W b(x)`, W (d, M) free, with parameters in the order of W's rows."""
+
+    def basis(self, X: np.ndarray) -> np.ndarray:
+        """The basis that all actions share.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States, of any precision.
+
+        Returns
+        -------
+        array (N, M)
+            `b(x)`, in double precision.
+        """
+        ...
 
 
-def fitted(transformer, X: np.ndarray, sample_weight: np.ndarray | None):
-    """A copy of a scikit-learn transformer, fitted to states X (N, n), with weights (N,) where it takes them."""
+@runtime_checkable
+class Compilable(Protocol):
+    """A feature map that can be compiled for a control loop."""
+
+    def compile(self, w: np.ndarray) -> "CompiledPolicy":
+        """The policy with these parameters, as arrays.
+
+        Parameters
+        ----------
+        w : array (P,)
+
+        Returns
+        -------
+        CompiledPolicy
+
+        Raises
+        ------
+        PolicyError
+            These features cannot be compiled.
+        """
+        ...
+
+
+def is_feature_map(candidate: object) -> bool:
+    """Whether an object, fitted or not, has the three methods of a feature map.
+
+    Parameters
+    ----------
+    candidate : object
+
+    Returns
+    -------
+    bool
+    """
+    return isinstance(candidate, Features) and not isinstance(candidate, type)
+
+
+def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> Features:
+    """A copy of a feature map, fitted.
+
+    Parameters
+    ----------
+    features : Features
+        Left as it is.
+    X : array (N, n)
+        States.
+    d : int
+        Dimension of the actions.
+    sample_weight : array (N,), optional
+        Passed on where `fit` takes it.
+
+    Returns
+    -------
+    Features
+    """
+    copy = clone(features, safe=False)
+    weighted = sample_weight is not None and has_fit_parameter(copy, "sample_weight")
+    copy.fit(X, d, **({"sample_weight": sample_weight} if weighted else {}))
+    return copy
+
+
+def fit_transformer(transformer: Any, X: np.ndarray, sample_weight: np.ndarray | None = None) -> Any:
+    """A copy of a scikit-learn transformer, fitted.
+
+    Parameters
+    ----------
+    transformer : transformer
+        Left as it is.
+    X : array (N, n)
+        States.
+    sample_weight : array (N,), optional
+        Passed on where `fit` takes it.
+
+    Returns
+    -------
+    transformer
+    """
     weighted = sample_weight is not None and has_fit_parameter(transformer, "sample_weight")
     return clone(transformer).fit(X, **({"sample_weight": sample_weight} if weighted else {}))
 
 
 def check_square(name: str, X: np.ndarray, d: int) -> None:
-    """Raise a `PolicyError` where states X (N, n) and actions of dimension d do not pair up."""
+    """Refuse states and actions that do not pair up.
+
+    Parameters
+    ----------
+    name : str
+        Of the features, for the sentence.
+    X : array (N, n)
+        States.
+    d : int
+        Dimension of the actions.
+
+    Raises
+    ------
+    PolicyError
+        d is not n.
+    """
     if X.shape[1] != d:
         raise PolicyError(
             f"{name} needs as many actions as states, in the same order, got {X.shape[1]} states and {d} actions: "

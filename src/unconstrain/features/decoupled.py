@@ -1,15 +1,17 @@
-"""Decoupled features: each joint's policy depends on that joint alone, `pi_j(x) = w_jᵀ b_j(x_j)`.
+"""Decoupled features: each joint's policy depends on that joint alone, `π_j(x) = w_jᵀ b_j(x_j)`.
 
 With the parameters of the n actions one after the other, what is seen along q is
-`v = (q_1 b_1(x_1), ..., q_n b_n(x_n))`:
-n k parameters where full features on the same splines have n² k. An action seen along one direction then tells much
-more about each, and from the same data far more is learnt, if the policy is of this kind; springs, attractors and
-joint-limit avoidance in joint space are.
+`v = (q_1 b_1(x_1), ..., q_n b_n(x_n))`: n k parameters where full features on the same splines have n² k. An action
+seen along one direction then tells much more about each, and from the same data far more is learnt, if the policy is of
+this kind; springs, attractors and joint-limit avoidance in joint space are.
 
 The weight decay is to mean smoothness: a plain λ‖w‖² would pull splines that few samples touch, at the ends of the
 range, to zero, and the policy would break off there. So the parameters are the second differences of the splines'
-coefficients, and the least of a straight line (P-splines: Eilers and Marx, Flexible smoothing with B-splines and
-penalties, 1996); where there are no data, the policy goes on straight.
+coefficients, and a little of a straight line (P-splines); where there are no data, the policy goes on straight.
+
+References
+----------
+Eilers and Marx, Flexible smoothing with B-splines and penalties, 1996.
 """
 
 import numpy as np
@@ -31,36 +33,65 @@ LINE = 0.01
 
 
 class DecoupledFeatures(BaseEstimator):
-    """`pi_j(x) = w_jᵀ b_j(x_j)`, with B-splines `b_j` in one dimension, by scikit-learn's `SplineTransformer`.
+    """The features of `π_j(x) = w_jᵀ b_j(x_j)`, with B-splines `b_j` in one dimension.
 
-    Needs as many actions as states, action j belonging to state j (a joint's velocity to its angle).
+    They need as many actions as states, action j belonging to state j (a joint's velocity to its angle). The splines of
+    a dimension sum to one, so a constant policy can be represented; a straight one too.
 
-    n_knots: knots per dimension, evenly over the data's range; each dimension has n_knots + degree - 1 parameters.
-    degree: of the polynomials between knots.
-    extrapolation: beyond the data's range "linear" goes on with the slope at its border, "constant" with the value,
-        and "continue" with the last polynomial, which soon grows beyond reason.
+    Parameters
+    ----------
+    n_knots : int
+        Knots in each dimension, evenly over the data's range; each dimension has n_knots + degree - 1 parameters.
+    degree : int
+        Of the polynomials between knots.
+    extrapolation : {"linear", "constant", "continue"}
+        Beyond the data's range "linear" goes on with the slope at its border, "constant" with the value, and "continue"
+        with the last polynomial, which soon grows beyond reason.
 
-    The splines of a dimension sum to one, so a constant policy can be represented; a straight one too. After `fit` the
-    coefficients of joint j's splines are `to_coefficients_ @ w_j`.
+    Attributes
+    ----------
+    splines_ : SplineTransformer
+        The splines of all dimensions.
+    to_coefficients_ : array (k, k)
+        The coefficients of joint j's splines are `to_coefficients_ @ w_j`.
+    n_actions_ : int
+        d = n.
 
+    Examples
+    --------
     >>> import numpy as np, unconstrain as uc
     >>> X = np.random.default_rng(0).uniform(-1, 1, size=(500, 3))
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(500, 1, 3)))
     >>> U = np.einsum("nij,nj->ni", N, -np.sin(3 * X))
-    >>> policy = uc.ParametricPolicy(uc.DecoupledFeatures(), alpha="cv").fit(X, U)
+    >>> policy = uc.ParametricPolicy(uc.DecoupledFeatures()).fit(X, U)
     >>> bool(uc.metrics.unconstrained_policy_error(-np.sin(3 * X), policy.predict(X)) < 1e-6)
     True
     """
 
-    def __init__(self, n_knots=15, *, degree=3, extrapolation="linear"):
+    def __init__(self, n_knots: int = 15, *, degree: int = 3, extrapolation: str = "linear"):
         self.n_knots = n_knots
         self.degree = degree
         self.extrapolation = extrapolation
 
     def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "DecoupledFeatures":
-        """Set the knots over the range of states X (N, n) whose weight is not zero.
+        """Set the knots over the range of the states whose weight is not zero.
 
-        Raises `PolicyError` where d is not n, and for numbers of knots or degrees that make no spline.
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        d : int
+            Dimension of the actions.
+        sample_weight : array (N,), optional
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        PolicyError
+            d is not n, or the numbers of knots or the degree make no spline.
         """
         check_square("DecoupledFeatures", X, d)
         check_choice(self.extrapolation, "extrapolation", EXTRAPOLATIONS)
@@ -80,24 +111,47 @@ class DecoupledFeatures(BaseEstimator):
             knots=knots, degree=self.degree, extrapolation="continue" if straight else self.extrapolation
         ).fit(knots)
         self.n_actions_ = d
-        self.n_basis_ = self.n_knots + self.degree - 1  # of one dimension
-        self.n_parameters_ = d * self.n_basis_
-        self.to_coefficients_ = _coefficients_from_differences(self.n_basis_)
+        self.to_coefficients_ = _coefficients_from_differences(self.n_knots + self.degree - 1)
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """`v = (q_1 b_1(x_1), ..., q_n b_n(x_n))`, (N, n k), for states X (N, n) and directions (N, n)."""
-        V = self._basis(X)
+        """The features seen along one direction at each state.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, n)
+
+        Returns
+        -------
+        array (N, n k)
+            `v = (q_1 b_1(x_1), ..., q_n b_n(x_n))`.
+        """
+        V = self._splines(X)
         V *= directions[:, :, None]
         return V.reshape(len(X), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """`pi_j(x) = w_jᵀ b_j(x_j)`: actions (N, n) at states X (N, n) for parameters w (n k,)."""
-        return np.einsum("njk,jk->nj", self._basis(X), w.reshape(self.n_actions_, -1))
+        """The policy itself.
 
-    def _basis(self, X: np.ndarray) -> np.ndarray:
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (n k,)
+            Parameters.
+
+        Returns
+        -------
+        array (N, n)
+            `π_j(x) = w_jᵀ b_j(x_j)`.
+        """
+        return np.einsum("njk,jk->nj", self._splines(X), w.reshape(self.n_actions_, -1))
+
+    def _splines(self, X: np.ndarray) -> np.ndarray:
         """`b_j(x_j)`, seen from the parameters: (N, n, k)."""
-        return self.splines_.transform(X).reshape(*X.shape, self.n_basis_) @ self.to_coefficients_
+        return self.splines_.transform(X).reshape(*X.shape, -1) @ self.to_coefficients_
 
 
 def _coefficients_from_differences(k: int) -> np.ndarray:

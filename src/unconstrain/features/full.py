@@ -1,32 +1,44 @@
-"""Full features: every action has its own weights on one shared basis, `pi(x) = W b(x)`.
+"""Full features: every action has its own weights on one shared basis, `π(x) = W b(x)`.
 
 With the parameters in the order of W's rows, `w = vec(Wᵀ)`, what is seen along q is `v = q ⊗ b(x)`, and a sum of
-`v vᵀ` is a sum of `(q qᵀ) ⊗ (b bᵀ)`: symmetric in both factors. `moments` makes use of that.
-Source: ICRA 2009, Sec. III-A.
+`v vᵀ` is a sum of `(q qᵀ) ⊗ (b bᵀ)`: symmetric in both factors. `fitting.kernels` makes use of that.
+
+References
+----------
+Howard et al., ICRA 2009, Sec. III-A.
 """
 
+from typing import Any
+
 import numpy as np
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import BaseEstimator
 
 from unconstrain.errors import PolicyError
-from unconstrain.features.base import PolicyFeatures, fitted, is_policy_features
-
-
-def with_one(X: np.ndarray) -> np.ndarray:
-    """`(x, 1)` of states X (N, n): (N, n + 1), in double precision; stored a row a feature, as products are formed."""
-    rows = np.empty((X.shape[1] + 1, len(X)))
-    rows[:-1], rows[-1] = X.T, 1.0
-    return rows.T
+from unconstrain.features.base import Features, fit_transformer, is_feature_map
 
 
 class FullFeatures(BaseEstimator):
-    """`pi(x) = W b(x)` with W (d, M) free.
+    """The features of `π(x) = W b(x)` with W (d, M) free.
 
-    transformer: any scikit-learn transformer whose output is `b(x)`, or None for the linear policy,
-        `b(x) = (x, 1)`. It is cloned, never changed.
+    Parameters
+    ----------
+    transformer : scikit-learn transformer, optional
+        Its output is `b(x)`. It is cloned, never changed. None stands for the linear policy, `b(x) = (x, 1)`.
+
+    Attributes
+    ----------
+    transformer_ : transformer or None
+        The fitted copy.
+    n_actions_ : int
+        d.
+
+    Raises
+    ------
+    PolicyError
+        The transformer is none.
     """
 
-    def __init__(self, transformer=None):
+    def __init__(self, transformer: Any = None):
         if transformer is not None and not (
             hasattr(transformer, "fit") and hasattr(transformer, "transform")
         ):
@@ -36,32 +48,97 @@ class FullFeatures(BaseEstimator):
         self.transformer = transformer
 
     def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> "FullFeatures":
-        """Fit the transformer to states X (N, n), with weights (N,) where it takes them."""
-        self.transformer_ = None if self.transformer is None else fitted(self.transformer, X, sample_weight)
+        """Fit the transformer.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        d : int
+            Dimension of the actions.
+        sample_weight : array (N,), optional
+            Passed on where the transformer takes it.
+
+        Returns
+        -------
+        self
+        """
+        self.transformer_ = (
+            None if self.transformer is None else fit_transformer(self.transformer, X, sample_weight)
+        )
         self.n_actions_ = d
-        self.n_basis_ = self.basis(X[:1]).shape[1]
-        self.n_parameters_ = d * self.n_basis_
         return self
 
     def basis(self, X: np.ndarray) -> np.ndarray:
-        """`b(x)` at states X (N, n): an array (N, M)."""
+        """The basis that all actions share.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States, of any precision.
+
+        Returns
+        -------
+        array (N, M)
+            `b(x)`, in double precision.
+        """
         if self.transformer_ is None:
-            return with_one(X)
+            # Stored a row a feature, as products are formed.
+            rows = np.empty((X.shape[1] + 1, len(X)))
+            rows[:-1], rows[-1] = X.T, 1.0
+            return rows.T
         B = self.transformer_.transform(X.astype(np.float64, copy=False))
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """`v = q ⊗ b(x)`, (N, dM), for states X (N, n) and directions (N, d)."""
+        """The features seen along one direction at each state.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, d)
+
+        Returns
+        -------
+        array (N, dM)
+            `v = q ⊗ b(x)`.
+        """
         return (directions[:, :, None] * self.basis(X)[:, None, :]).reshape(len(X), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """`pi(x) = W b(x)`: actions (N, d) at states X (N, n) for parameters w (dM,)."""
+        """The policy itself.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (dM,)
+            Parameters.
+
+        Returns
+        -------
+        array (N, d)
+            `π(x) = W b(x)`.
+        """
         return self.basis(X) @ w.reshape(self.n_actions_, -1).T
 
 
-def as_policy_features(given) -> PolicyFeatures:
-    """What `features=` stands for, not fitted yet: a copy of policy features, or the full features on a transformer.
+def as_features(given: Any) -> Features:
+    """The feature map that an argument `features=` stands for, not fitted yet.
 
-    Raises `PolicyError` for anything that is neither, nor None.
+    Parameters
+    ----------
+    given : Features, scikit-learn transformer, or None
+        A transformer stands for the full features on it, None for those of the linear policy.
+
+    Returns
+    -------
+    Features
+
+    Raises
+    ------
+    PolicyError
+        It is none of these.
     """
-    return clone(given) if is_policy_features(given) else FullFeatures(given)
+    return given if is_feature_map(given) else FullFeatures(given)

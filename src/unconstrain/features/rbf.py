@@ -1,6 +1,14 @@
-"""Normalised Gaussian radial basis functions, `b_i(x) = K(x - c_i) / Σ_j K(x - c_j)`. Source: ICRA 2009, Sec. III-A."""
+"""Normalised Gaussian radial basis functions, `b_i(x) = K(x - c_i) / Σ_j K(x - c_j)`.
+
+References
+----------
+Howard et al., ICRA 2009, Sec. III-A.
+"""
+
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
@@ -12,30 +20,70 @@ from unconstrain.receptive import normalized_activations
 class NormalizedRBF(TransformerMixin, BaseEstimator):
     """A scikit-learn transformer from states (N, n) to normalised Gaussian RBFs (N, M), whose rows sum to one.
 
-    n_centers: how many centres to place; for "grid" the most that may be, the same number along each dimension.
-    width: σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit; None takes 1.5 times the centres' mean spacing (for
+    Parameters
+    ----------
+    n_centers : int
+        How many centres to place; for "grid" the most that may be, the same number along each dimension.
+    width : float, optional
+        σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit. None takes 1.5 times the centres' mean spacing (for
         "coverage": the width that covers).
-    centers: "kmeans", "grid" over the data's range, "coverage", or an array (M, n).
-    coverage: for "coverage", the activation that every state has in at least one centre.
-    random_state: for "kmeans".
+    centers : {"kmeans", "grid", "coverage"} or array (M, n)
+        "grid" spans the data's range.
+    coverage : float
+        For "coverage", the activation that every state has in at least one centre.
+    random_state : int, optional
+        For "kmeans".
 
-    After `fit`: `centers_` (M, n) and `width_`.
+    Attributes
+    ----------
+    centers_ : array (M, n)
+    width_ : float
 
+    Examples
+    --------
     >>> import numpy as np, unconstrain as uc
     >>> b = uc.NormalizedRBF(n_centers=36, centers="grid").fit(np.random.default_rng(0).uniform(size=(100, 2)))
     >>> b.transform([[0.5, 0.5]]).shape
     (1, 36)
     """
 
-    def __init__(self, n_centers=36, *, width=None, centers="kmeans", coverage=0.7, random_state=0):
+    def __init__(
+        self,
+        n_centers: int = 36,
+        *,
+        width: float | None = None,
+        centers: Any = "kmeans",
+        coverage: float = 0.7,
+        random_state: int | None = 0,
+    ):
         self.n_centers = n_centers
         self.width = width
         self.centers = centers
         self.coverage = coverage
         self.random_state = random_state
 
-    def fit(self, X, y=None, sample_weight=None) -> "NormalizedRBF":
-        """Place the centres for states X (N, n), weighted (N,); y is ignored. Raises `DataError` or `PolicyError`."""
+    def fit(self, X: ArrayLike, y: None = None, sample_weight: ArrayLike | None = None) -> "NormalizedRBF":
+        """Place the centres.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        y : None
+            Ignored.
+        sample_weight : array (N,), optional
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        DataError
+            The states or weights are not arrays of finite numbers of these shapes.
+        PolicyError
+            The options place no centres.
+        """
         X = check_states(self, X, reset=True)
         weights = check_weights(sample_weight, X)
         X, weights = X[weights > 0], weights[weights > 0]
@@ -50,12 +98,31 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         )
         return self
 
-    def transform(self, X) -> np.ndarray:
-        """`b(x)` at states X (N, n): (N, M), finite however far a state is from all centres."""
+    def transform(self, X: ArrayLike) -> np.ndarray:
+        """The basis functions at states, finite however far a state is from all centres.
+
+        Parameters
+        ----------
+        X : array (N, n)
+
+        Returns
+        -------
+        array (N, M)
+            `b(x)`.
+        """
         check_is_fitted(self)
         return normalized_activations(check_states(self, X), self.centers_, self.width_)
 
-    def get_feature_names_out(self, input_features=None) -> np.ndarray:
-        """rbf0, rbf1, ..., one name a centre."""
+    def get_feature_names_out(self, input_features: Any = None) -> np.ndarray:
+        """One name for each centre: rbf0, rbf1, ...
+
+        Parameters
+        ----------
+        input_features : ignored
+
+        Returns
+        -------
+        array (M,) of str
+        """
         check_is_fitted(self)
         return np.array([f"rbf{i}" for i in range(len(self.centers_))], dtype=object)

@@ -5,8 +5,12 @@ For any policy linear in its parameters, `pi(x) = Φ(x) w`, any of the risks is
     E(w) = Σ_n ω_n ‖Q_n u_n - V_n w‖² = s - 2 gᵀw + wᵀH w,        V_n = Q_n Φ(x_n)
     H = Σ ω_n V_nᵀ V_n,    g = Σ ω_n V_nᵀ Q_n u_n,    s = Σ ω_n ‖Q_n u_n‖²
 
-and the weight decay λ gives `w = (H + λI)⁻¹ g` (ICRA 2009, eq. 8). Moments add: across blocks, episodes, folds,
-files and machines. Everything that is chosen or reported about a fit is computed from them.
+and the weight decay λ gives `w = (H + λI)⁻¹ g`. Moments add: across blocks, episodes, folds, files and machines.
+Everything that is chosen or reported about a fit is computed from them.
+
+References
+----------
+Howard et al., ICRA 2009, equation (8).
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,6 +19,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from unconstrain.parallel import blocks, shared_out
 from unconstrain.storage import Kind, load_object, save_object
@@ -28,12 +33,18 @@ CLEAR_OF_ROUNDING = 1e-10
 class Moments:
     """`H`, `g`, `s` and the counts behind them; local models have them stacked along leading axes.
 
-    H: (..., P, P), symmetric.
-    g: (..., P, K). K = 1, but for problems that share one H: the d dimensions of the action when nothing is
-        projected.
-    squares: `s`, (...,), in squared units of the action.
-    weight: `Σ ω_n`, (...,).
-    n_samples: how many samples were added.
+    Parameters
+    ----------
+    H : array (..., P, P)
+        Symmetric.
+    g : array (..., P, K)
+        K = 1, except for problems that share one H: the d dimensions of the action when nothing is projected.
+    squares : array (...,)
+        s, in squared units of the action.
+    weight : array (...,)
+        `Σ ω_n`.
+    n_samples : int
+        How many samples were added.
     """
 
     H: np.ndarray
@@ -44,7 +55,19 @@ class Moments:
 
     @classmethod
     def zeros(cls, batch: tuple[int, ...], n_parameters: int, n_targets: int) -> "Moments":
-        """The moments of no data, for a batch of problems of P parameters and K targets each."""
+        """The moments of no data.
+
+        Parameters
+        ----------
+        batch : tuple of int
+            Leading axes.
+        n_parameters, n_targets : int
+            P and K.
+
+        Returns
+        -------
+        Moments
+        """
         return cls(
             H=np.zeros((*batch, n_parameters, n_parameters)),
             g=np.zeros((*batch, n_parameters, n_targets)),
@@ -88,7 +111,17 @@ class Moments:
 
     @staticmethod
     def sum(parts: Iterable["Moments"]) -> "Moments":
-        """The moments of all parts' data together."""
+        """The moments of all parts' data together.
+
+        Parameters
+        ----------
+        parts : iterable of Moments
+            At least one.
+
+        Returns
+        -------
+        Moments
+        """
         first, *rest = parts
         total = first
         for part in rest:
@@ -96,9 +129,17 @@ class Moments:
         return total
 
     def risk(self, w: np.ndarray) -> np.ndarray:
-        """`E(w) = s - 2 gᵀw + wᵀHw`, (..., L), summed over samples, for L candidates w (..., P, L, K).
+        """The risk of candidates, `E(w) = s - 2 gᵀw + wᵀHw`, summed over samples.
 
-        Never below zero: what rounding leaves there is cut off.
+        Parameters
+        ----------
+        w : array (..., P, L, K)
+            L candidates.
+
+        Returns
+        -------
+        array (..., L)
+            Never below zero: what rounding leaves there is cut off.
         """
         *batch, P, L, K = w.shape
         Hw = (self.H @ w.reshape(*batch, P, L * K)).reshape(w.shape)
@@ -106,8 +147,19 @@ class Moments:
         return np.maximum(error + self.squares[..., None], 0.0)
 
     def solve(self, alpha: float) -> np.ndarray:
-        """`w = (H + λI)⁺ g` of least norm for one λ: (..., P, K).
+        """The solution `w = (H + λI)⁺ g` of least norm for one λ.
 
+        Parameters
+        ----------
+        alpha : float
+            λ.
+
+        Returns
+        -------
+        array (..., P, K)
+
+        Notes
+        -----
         Where λ lifts H well clear of its rounding the equations are solved as they stand, at a tenth of the cost of
         the eigendecomposition that is needed otherwise, and for many λ.
         """
@@ -118,7 +170,12 @@ class Moments:
         return self.decompose().solve([alpha])[..., 0, :]
 
     def decompose(self) -> "Spectrum":
-        """The eigendecomposition of H, which solves for every λ at once."""
+        """The eigendecomposition of H, which solves for every λ at once.
+
+        Returns
+        -------
+        Spectrum
+        """
         if self.H.ndim == 2:
             values, vectors = np.linalg.eigh(self.H)
         else:
@@ -138,7 +195,14 @@ class Moments:
 class Spectrum:
     """`H = Q diag(values) Qᵀ` and `Qᵀg`: any λ costs one product from here.
 
-    values: (..., P), ascending. vectors: Q, (..., P, P). along: `Qᵀg`, (..., P, K).
+    Parameters
+    ----------
+    values : array (..., P)
+        Ascending.
+    vectors : array (..., P, P)
+        Q.
+    along : array (..., P, K)
+        `Qᵀg`.
     """
 
     values: np.ndarray
@@ -155,8 +219,18 @@ class Spectrum:
         floor = self.values.shape[-1] * np.finfo(np.float64).eps * self.values[..., -1:]
         return self.values > np.maximum(floor, 0.0)
 
-    def solve(self, alphas) -> np.ndarray:
-        """`w = (H + λI)⁺ g` of least norm for each λ of `alphas` (L,): (..., P, L, K)."""
+    def solve(self, alphas: ArrayLike) -> np.ndarray:
+        """The solutions `w = (H + λI)⁺ g` of least norm.
+
+        Parameters
+        ----------
+        alphas : array (L,)
+            One λ for each.
+
+        Returns
+        -------
+        array (..., P, L, K)
+        """
         alphas = np.asarray(alphas, dtype=np.float64)
         determined = self.determined[..., None]
         denominator = np.where(determined, self.values[..., None] + alphas, 1.0)

@@ -1,21 +1,42 @@
-"""What is seen of samples: the part of the action that a risk looks at.
+"""What a recorded action says of the policy.
 
-Every risk is an error behind a projection, `Σ_n ‖Q_n (u_n - p_n)‖²` (see `risk`), so all it knows of a sample is `Q_n`
-and `Q_n u_n`: the whole action, what the constraint lets through, or its length along the motion.
+Every risk is a sum of squared errors behind projections,
+
+    E = Σ_n ω_n ‖Q_n (u_n - p_n)‖²,        p_n = model(x_n),
+
+so all it uses of a sample is `Q_n` and `Q_n u_n`:
+
+| risk          | the sample                  | Q_n  | Q_n u_n | error            |
+| ------------- | --------------------------- | ---- | ------- | ---------------- |
+| inconsistency | its projection is not known | û_nᵀ | r_n     | (r_n - û_nᵀ p_n)² |
+| inconsistency | its projection is known     | N_n  | u_n     | ‖u_n - N_n p_n‖² |
+| direct        | any                         | I    | u_n     | ‖u_n - p_n‖²     |
+
+with `r = ‖u‖` and `û = u / r`. `û ûᵀ` projects onto a line that surely lies in the image of the unknown N, so the true
+policy has no inconsistency, whatever the constraints were. For every model
+
+    inconsistency <= constrained policy error <= unconstrained policy error.
+
+A sample that does not move and whose projection is not known says nothing. One whose projection is known counts even
+then: `N π = 0` there.
+
+References
+----------
+Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) to (7).
 """
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from unconstrain.motion import NO_MOTION, lengths
 
-RISKS = ("auto", "inconsistency", "direct", "constrained")
+RISKS = ("inconsistency", "direct")
 
 
-class Sight(Protocol):
-    """What a risk sees of N samples: `Q_n` and `Q_n u_n` of `Σ_n ‖Q_n (u_n - p_n)‖²`. A part of it is a sight too."""
+class Observation(Protocol):
+    """What N samples say of the policy: `Q_n` and `Q_n u_n`. Slicing returns an observation of those samples."""
 
     @property
     def rows(self) -> np.ndarray:
@@ -34,27 +55,37 @@ class Sight(Protocol):
 
     @property
     def whole(self) -> bool:
-        """Whether every `Q_n` is the identity, so that the action's dimensions part company."""
+        """Whether every `Q_n` is the identity, so that the dimensions of the action can be solved one by one."""
         ...
 
     @property
     def n_actions(self) -> int:
-        """d."""
+        """The number of action dimensions, d."""
         ...
 
     @property
     def n_rows(self) -> int:
-        """k."""
+        """The number of rows of each `Q_n`, k."""
         ...
 
     def __len__(self) -> int: ...
 
-    def __getitem__(self, index) -> "Sight": ...
+    def __getitem__(self, index: Any) -> "Observation": ...
 
 
 @dataclass(frozen=True)
 class Projected:
-    """The sight through projections that are there as arrays."""
+    """The observation behind projections that are held as arrays.
+
+    Parameters
+    ----------
+    rows : array (N, k, d)
+        `Q`.
+    targets : array (N, k)
+        `Q u`.
+    whole : bool
+        Whether every `Q` is the identity.
+    """
 
     rows: np.ndarray
     targets: np.ndarray
@@ -63,30 +94,40 @@ class Projected:
     def __len__(self) -> int:
         return len(self.targets)
 
-    def __getitem__(self, index) -> "Projected":
+    def __getitem__(self, index: Any) -> "Projected":
         return Projected(self.rows[index], self.targets[index], self.whole)
 
     @property
     def n_actions(self) -> int:
+        """The number of action dimensions, d."""
         return self.rows.shape[2]
 
     @property
     def n_rows(self) -> int:
+        """The number of rows of each `Q_n`, k."""
         return self.rows.shape[1]
 
     @property
     def squares(self) -> np.ndarray:
+        """`‖Q u‖²` of each sample, (N,)."""
         return np.einsum("nk,nk->n", self.targets, self.targets)
 
 
 @dataclass(frozen=True)
 class AlongMotion:
-    """The sight of the inconsistency, `Q = ûᵀ` and `Q u = r`, made where it is looked at.
+    """The observation of the inconsistency, `Q = ûᵀ` and `Q u = r`.
 
-    Directions are worked out a block at a time, in the processor's cache: looking at them is then cheaper than
-    fetching them from memory would be.
+    Directions are computed when they are used, a block at a time in the processor's cache: that is cheaper than
+    fetching them from memory.
 
-    actions: (N, d), of any precision. lengths: `r`, (N,), and inverse: `1/r`, both zero where nothing moves.
+    Parameters
+    ----------
+    actions : array (N, d)
+        Of any precision.
+    lengths : array (N,)
+        `r`, zero where nothing moves.
+    inverse : array (N,)
+        `1/r`, zero where nothing moves.
     """
 
     actions: np.ndarray
@@ -96,7 +137,7 @@ class AlongMotion:
     def __len__(self) -> int:
         return len(self.lengths)
 
-    def __getitem__(self, index) -> "AlongMotion":
+    def __getitem__(self, index: Any) -> "AlongMotion":
         if isinstance(index, slice):
             return AlongMotion(self.actions[index], self.lengths[index], self.inverse[index])
         index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
@@ -105,73 +146,119 @@ class AlongMotion:
 
     @property
     def whole(self) -> bool:
+        """False: a direction is not the identity."""
         return False
 
     @property
     def n_actions(self) -> int:
+        """The number of action dimensions, d."""
         return self.actions.shape[1]
 
     @property
     def n_rows(self) -> int:
+        """One: the direction."""
         return 1
 
     @property
     def rows(self) -> np.ndarray:
+        """`ûᵀ`, (N, 1, d)."""
         # Stored a row a dimension, along which products of directions are formed.
         return np.multiply(self.actions.T, self.inverse, order="C").T[:, None, :]
 
     @property
     def targets(self) -> np.ndarray:
+        """`r`, (N, 1)."""
         return self.lengths[:, None]
 
     @property
     def squares(self) -> np.ndarray:
+        """`r²`, (N,)."""
         return self.lengths**2
 
 
 def unknown(projections: np.ndarray) -> np.ndarray:
-    """Which of the projections (N, d, d) are not known, as a mask (N,): those that are NaN."""
+    """Which projections are not known.
+
+    Parameters
+    ----------
+    projections : array (N, d, d)
+
+    Returns
+    -------
+    array (N,) of bool
+        True for those that are NaN.
+    """
     return np.isnan(projections).any(axis=(1, 2))
 
 
 def informative(projections: np.ndarray) -> np.ndarray:
-    """Which projections (N, d, d) say something of the policy even where nothing moves, as a mask (N,)."""
+    """Which projections say something of the policy even where nothing moves.
+
+    Parameters
+    ----------
+    projections : array (N, d, d)
+
+    Returns
+    -------
+    array (N,) of bool
+        True for those that are known and not zero.
+    """
     return ~unknown(projections) & projections.any(axis=(1, 2))
 
 
-def sight(
+def observe(
     risk: str, U: np.ndarray, projections: np.ndarray | None = None, r: np.ndarray | None = None
-) -> Sight:
-    """What `risk`, one of `RISKS`, sees of actions U (N, d).
+) -> Observation:
+    """What a risk takes from recorded actions.
 
-    projections: (N, d, d), for "constrained" and "auto"; for "auto" NaN where they are not known, or None.
-    r: the actions' lengths (N,), zero where nothing moves, if they are worked out already.
+    Parameters
+    ----------
+    risk : {"inconsistency", "direct"}
+    U : array (N, d)
+        The actions.
+    projections : array (N, d, d), optional
+        The nullspace projections, all NaN where one is not known. The direct risk does not use them.
+    r : array (N,), optional
+        The lengths of the actions, zero where nothing moves, if they are computed already.
+
+    Returns
+    -------
+    Observation
     """
-    if risk == "inconsistency" or (risk == "auto" and projections is None):
-        return _along_motion(U, r)
     d = U.shape[1]
     if risk == "direct":
-        # Squared by whoever looks, so in double precision.
-        return Projected(
-            np.broadcast_to(np.eye(d), (len(U), d, d)), U.astype(np.float64, copy=False), whole=True
-        )
-    assert projections is not None
-    if risk == "constrained":
-        # An orthogonal projection is its own Q: NᵀN = N.
-        return Projected(projections, np.einsum("nij,nj->ni", projections, U))
-    hidden = unknown(projections)
+        # Solvers square these, so they are in double precision.
+        identities = np.broadcast_to(np.eye(d), (len(U), d, d))
+        return Projected(identities, U.astype(np.float64, copy=False), whole=True)
     along = _along_motion(U, r)
+    if projections is None:
+        return along
+    hidden = unknown(projections)
     if hidden.all():
         return along
+    # An orthogonal projection is its own Q: NᵀN = N.
     rows = np.where(hidden[:, None, None], 0.0, projections)
     targets = np.einsum("nij,nj->ni", rows, U)
     rows[hidden, 0], targets[hidden, 0] = along[hidden].rows[:, 0], along.lengths[hidden]
     return Projected(rows, targets)
 
 
-def errors(seen: Sight, P: np.ndarray) -> np.ndarray:
-    """`‖Q (u - p)‖²` of predictions P (N, d), (N,), in squared units of the action."""
-    return np.sum((seen.targets - np.einsum("nkd,nd->nk", seen.rows, P)) ** 2, axis=1)
+def squared_errors(observation: Observation, P: np.ndarray) -> np.ndarray:
+    """The error of predictions behind the observation's projections.
+
+    Parameters
+    ----------
+    observation : Observation
+        Of N samples.
+    P : array (N, d)
+        Predicted actions.
+
+    Returns
+    -------
+    array (N,)
+        `‖Q (u - p)‖²`, in squared units of the action.
+    """
+    return np.sum((observation.targets - np.einsum("nkd,nd->nk", observation.rows, P)) ** 2, axis=1)
 
 
 def _along_motion(U: np.ndarray, r: np.ndarray | None = None) -> AlongMotion:

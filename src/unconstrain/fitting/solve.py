@@ -1,12 +1,14 @@
 """Dealing episodes out to folds, and choosing the weight decay λ from moments by fold."""
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 from unconstrain.errors import DataError
 from unconstrain.fitting.moments import Moments
 
+N_FOLDS = 5
 N_ALPHAS = 25
 # λ from one that flattens the policy to one at the resolution of H, relative to H's largest eigenvalue.
 SMALLEST, LARGEST = 1e-12, 1e0
@@ -15,62 +17,131 @@ SMALLEST, LARGEST = 1e-12, 1e0
 # slight misfits happen to ask for, many times the policy.
 INDISTINGUISHABLE = 0.01
 
+ONE_FOLD = (
+    'alpha="cv" needs motion in at least two episodes, or without groups in two fifths of the samples, to hold some '
+    "out: give more episodes, no groups, or a number for alpha"
+)
+
 
 class EpisodeFolds:
     """Deals episodes out to folds: the i-th new episode goes to fold i mod n_folds, and stays there.
 
     The rule needs no knowledge of what is yet to come, so a stream is dealt out as the whole would be. Samples
     without episodes are cut into contiguous blocks, since neighbouring samples tell too much about each other.
+
+    Parameters
+    ----------
+    n_folds : int
+    known : dict, optional
+        Folds of episodes that were dealt out elsewhere.
+
+    Attributes
+    ----------
+    fold_of : dict
+        The fold of every episode so far, by its label.
+    n_dealt : int
+        How many episodes were dealt out here.
     """
 
-    def __init__(self, n_folds: int = 5):
+    def __init__(self, n_folds: int = N_FOLDS, known: dict[Hashable, int] | None = None):
         self.n_folds = n_folds
-        self.fold_of: dict = {}
+        self.fold_of: dict[Hashable, int] = dict(known or {})
+        self.n_dealt = 0
 
     def assign(self, groups: np.ndarray | None, n_samples: int) -> np.ndarray:
-        """The fold of each sample, (N,), for episode labels `groups` (N,), or None."""
+        """Deal out the episodes of some samples that are new.
+
+        Parameters
+        ----------
+        groups : array (N,) or None
+            Episode labels.
+        n_samples : int
+            N.
+
+        Returns
+        -------
+        array (N,) of int
+            The fold of each sample.
+        """
         if groups is None:
             return np.arange(n_samples) * self.n_folds // n_samples
         if not n_samples:
             return np.zeros(0, dtype=int)
-        # An episode's samples mostly follow each other, so only where the label changes is it looked at.
+        # An episode's samples mostly follow each other, so labels are looked up only where they change.
         starts = np.concatenate([[True], groups[1:] != groups[:-1]])
-        fold_of, deal = self.fold_of, self.n_folds
-        folds = [fold_of.setdefault(name, len(fold_of) % deal) for name in groups[starts].tolist()]
+        folds = [self._fold(label) for label in groups[starts].tolist()]
         return np.repeat(folds, np.diff(np.flatnonzero(np.append(starts, True))))
 
-    def __getstate__(self) -> dict:
-        # An array of labels, in the order they were dealt out, takes a file a thousandth of what a dictionary takes.
+    def deal_unnamed(self, n_episodes: int) -> None:
+        """Count episodes that were dealt out elsewhere, after those here, and whose labels are not kept.
+
+        Parameters
+        ----------
+        n_episodes : int
+        """
+        self.n_dealt += n_episodes
+
+    def copy(self) -> "EpisodeFolds":
+        """The same folds, to be dealt to independently."""
+        other = EpisodeFolds(self.n_folds, self.fold_of)
+        other.n_dealt = self.n_dealt
+        return other
+
+    def _fold(self, label: Hashable) -> int:
+        fold = self.fold_of.get(label)
+        if fold is None:
+            fold = self.fold_of[label] = self.n_dealt % self.n_folds
+            self.n_dealt += 1
+        return fold
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Arrays of labels and folds take a file a thousandth of what a dictionary takes.
         labels = list(self.fold_of)
         kinds = {type(label) for label in labels}
-        return {"n_folds": self.n_folds, "labels": np.array(labels) if kinds in ({int}, {str}) else labels}
+        return {
+            "n_folds": self.n_folds,
+            "n_dealt": self.n_dealt,
+            "labels": np.array(labels) if kinds in ({int}, {str}) else labels,
+            "folds": np.fromiter(self.fold_of.values(), dtype=np.int64, count=len(labels)),
+        }
 
-    def __setstate__(self, state: dict) -> None:
-        self.n_folds = state["n_folds"]
-        if "fold_of" in state:  # as written by the first release
-            self.fold_of = state["fold_of"]
-        else:
-            labels = state["labels"]
-            labels = labels.tolist() if isinstance(labels, np.ndarray) else labels
-            self.fold_of = {label: i % self.n_folds for i, label in enumerate(labels)}
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        labels = state["labels"]
+        labels = labels.tolist() if isinstance(labels, np.ndarray) else labels
+        self.n_folds, self.n_dealt = state["n_folds"], state["n_dealt"]
+        self.fold_of = dict(zip(labels, state["folds"].tolist(), strict=True))
 
 
-def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
+def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
     """The λ with the least risk on folds left out one at a time, or the largest that is as good.
 
     Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
-    each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added. `scale` is the
-    largest eigenvalue of all folds' H; the candidates are set relative to it.
+    each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added.
 
-    Returns λ, the candidates (L,), and their held-out risk per unit of sample weight (L,).
-    Raises `DataError` where fewer than two folds hold data.
+    Parameters
+    ----------
+    folds : sequence of Moments
+        One for each fold.
+    scale : float
+        The largest eigenvalue of all folds' H; the candidates are set relative to it.
+
+    Returns
+    -------
+    alpha : float
+        The chosen λ.
+    alphas : array (L,)
+        The candidates.
+    risk : array (L,)
+        Their held-out risk per unit of sample weight, in squared units of the action.
+
+    Raises
+    ------
+    DataError
+        Fewer than two folds hold data.
     """
     folds = [fold for fold in folds if fold.n_samples]
     if len(folds) < 2:
-        raise DataError(
-            'alpha="cv" needs at least two episodes, or samples without groups, to hold some out: '
-            "give a number for alpha, or no groups"
-        )
+        raise DataError(ONE_FOLD)
     alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS) * (scale or 1.0)
     error = np.zeros(N_ALPHAS)
     for i, held_out in enumerate(folds):
@@ -82,10 +153,25 @@ def choose_alpha(folds: list[Moments], scale: float) -> tuple[float, np.ndarray,
     return float(alphas[as_good].max()), alphas, error
 
 
-def splits(n_samples: int, groups=None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows to train on and rows to test on, a pair a fold, dealt out as `EpisodeFolds` does.
+def splits(n_samples: int, groups: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Rows to train on and rows to test on, dealt out as `EpisodeFolds` does.
 
-    groups: episode labels (N,), or None. Raises `DataError` where there is one fold only.
+    Parameters
+    ----------
+    n_samples : int
+        N.
+    groups : array (N,), optional
+        Episode labels.
+
+    Yields
+    ------
+    train, test : array of int
+        One pair for each fold.
+
+    Raises
+    ------
+    DataError
+        There is one fold only.
     """
     fold = EpisodeFolds().assign(None if groups is None else np.asarray(groups), n_samples)
     present = np.unique(fold)

@@ -1,11 +1,14 @@
-"""What the policies share: scikit-learn's contract, moments by fold, λ, and what a fit reports."""
+"""What the policies share: options become a model, samples are added up, and the sums are solved."""
 
-import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
+from collections.abc import Callable
 from copy import copy
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
@@ -20,75 +23,258 @@ from unconstrain.arrays import (
     check_states,
     check_weights,
 )
-from unconstrain.deploy import compilation, onnx
-from unconstrain.deploy.compiled import CompiledPolicy
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.fitting import solve as selection
+from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution
+from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import RISKS, Sight, informative, sight, unknown
+from unconstrain.fitting.observation import RISKS
 from unconstrain.fitting.posterior import Posterior
-from unconstrain.fitting.tally import Tally
-from unconstrain.motion import NO_MOTION, lengths, moving
+from unconstrain.motion import moving
+from unconstrain.samples import Samples
 from unconstrain.storage import Kind, save_object
 
-NO_DIRECTION = (
-    "all actions are zero, and a zero action has no direction to learn from: check the action columns, "
-    "or differentiate the states over a longer window"
-)
+if TYPE_CHECKING:
+    from unconstrain.deploy.compiled import CompiledPolicy
 
-ADDED_UP = ("moments_", "folds_")
-"""What only learning on, uncertainty and solving anew need: sums over samples, and the folds of episodes."""
 LARGEST_DIMENSION = 10**6
 
 
-class Policy(RegressorMixin, BaseEstimator, ABC):
-    """Base of the estimators: `u = pi(x)`, linear in its parameters, fitted by adding up moments.
+class Policy(RegressorMixin, BaseEstimator):
+    """Base of the estimators `u = π(x)` that are linear in their parameters.
 
-    A subclass says where its models lie (`_place`), how samples add up (`_moments`), and what the solution means
-    (`_take_up`); everything else is here and the same for all.
+    A subclass has its options, and `place`, which turns them into a model.
+
+    Attributes
+    ----------
+    model_ : Model
+        What was fixed before any sample was added: features, centres, widths.
+    solution_ : Solution
+        The parameters, and what their choice was based on.
+    accumulator_ : Accumulator
+        The sums they were solved from. A policy loaded from a file has them only where it was saved with
+        `resumable=True`.
     """
 
-    moments_: list[Moments | None]  # by fold; None where a fold has no samples yet
-    folds_: selection.EpisodeFolds  # with alpha="cv"
-    n_actions_: int
-    n_samples_seen_: int
-    n_zero_actions_: int
-    n_known_constraints_: int
-    longest_action_: float
-    shortest_action_: float
+    risk: str
+    alpha: float | str
+    model_: Model
+    solution_: Solution
+    accumulator_: Accumulator
+    actions_are_scalars_: bool
+    n_features_in_: int
 
-    def fit(self, X, y, *, groups=None, sample_weight=None, projections=None):
-        """Learn from states X (N, n) and actions y (N, d), or (N,) for d = 1.
+    @abstractmethod
+    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
+        """Fix what depends on data.
 
-        groups: episode labels (N,), the folds for `alpha="cv"`; without them contiguous blocks are the folds.
-        sample_weight: (N,), multiplies each sample's squared error.
-        projections: N (N, d, d), what is known of each sample's constraint, for the risks "auto" and "constrained"; for
-            "auto" all NaN where it is not known (see `constraints`).
+        Parameters
+        ----------
+        X : array (N, n)
+            States, checked.
+        d : int
+            Dimension of the actions.
+        sample_weight : array (N,)
 
-        Raises `DataError` for bad arrays, and where all actions are zero though the risk needs their direction;
-        `PolicyError` for bad options.
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        PolicyError
+            An option is impossible.
         """
-        X, y = check_samples(self, X, y, reset=True, min_samples=2)
-        return self._add(X, y, groups, sample_weight, projections, first=True)
 
-    def partial_fit(self, X, y, *, groups=None, sample_weight=None, projections=None):
+    @property
+    @abstractmethod
+    def placed_by_data(self) -> bool:
+        """Whether `place` depends on where the states lie, and not just on their dimension."""
+
+    def fit(
+        self,
+        X: ArrayLike | Demonstrations,
+        y: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
+        projections: ArrayLike | None = None,
+    ) -> Self:
+        """Learn from states and actions.
+
+        Parameters
+        ----------
+        X : array (N, n), or Demonstrations
+            States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, and the
+            projections they know, unless these are given.
+        y : array (N, d) or (N,)
+            Actions.
+        groups : array (N,), optional
+            Episode labels, the folds for `alpha="cv"`; without them contiguous blocks are the folds.
+        sample_weight : array (N,), optional
+            Multiplies each sample's squared error.
+        projections : array (N, d, d), optional
+            The nullspace projection of each sample, all NaN where it is not known.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        DataError
+            Arrays are not finite or do not fit together, or nothing moves though the risk needs directions.
+        PolicyError
+            An option is impossible.
+        """
+        fresh = copy(self)
+        samples, scalars = fresh._check(X, y, groups, sample_weight, projections, first=True)
+        accumulator = fresh.start(samples)
+        accumulator.add(samples)
+        return self._adopt_from(fresh, accumulator, scalars)
+
+    def partial_fit(
+        self,
+        X: ArrayLike | Demonstrations,
+        y: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
+        projections: ArrayLike | None = None,
+    ) -> Self:
         """Learn from more samples; the result is that of one `fit` on all samples so far.
 
         That is exact whatever the pieces when λ is a number and nothing is placed by the data (linear features,
         centres given). Centres and other data-dependent features are placed by the first piece and kept; with
         `alpha="cv"` give `groups`, whose episodes stay in their fold from piece to piece.
+
+        Parameters
+        ----------
+        X, y, groups, sample_weight, projections
+            As for `fit`.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        DataError, PolicyError
+            As for `fit`; the policy then stays as it was.
         """
-        first = not hasattr(self, "moments_")
-        X, y = check_samples(self, X, y, reset=first, min_samples=2 if first else 1)
-        return self._add(X, y, groups, sample_weight, projections, first=first)
+        if not hasattr(self, "model_"):
+            return self.fit(X, y, groups=groups, sample_weight=sample_weight, projections=projections)
+        accumulator = self.resume()
+        fresh = copy(self)
+        samples, _ = fresh._check(X, y, groups, sample_weight, projections, first=False)
+        accumulator.longest = max(accumulator.longest, accumulator.total.longest)
+        accumulator.add(samples)
+        if accumulator.total.misjudged:
+            raise DataError(
+                f"an action is {accumulator.total.longest:.3g} long, and beside it some that were learnt from, of "
+                f"length {accumulator.total.shortest:.3g}, do not move: leave it out, or fit anew to all together"
+            )
+        return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
 
-    def predict(self, X, return_std: bool = False, return_cov: bool = False):
-        """Actions (N, d) at states X (N, n); (N,) if the policy was fitted to actions of that shape.
+    def start(self, samples: Samples) -> Accumulator:
+        """An accumulator for this policy's options, its model placed by some samples, to which nothing was added.
 
-        return_std: also how far the policy may be from that, as standard deviations of the actions' shape.
-        return_cov: also the covariances (N, d, d) of all actions; (N,) for actions (N,). Not both. See `uncertainty`.
+        Parameters
+        ----------
+        samples : Samples
+            Checked. Those that say nothing do not count in placing.
 
-        Raises `DataError` for states that are not finite or not of the dimension learnt, `PolicyError` for both.
+        Returns
+        -------
+        Accumulator
+
+        Raises
+        ------
+        PolicyError
+            An option is impossible.
+        DataError
+            None of the samples says anything.
+        """
+        self.check_options()
+        X, U, weights = samples.states, samples.actions, samples.weights
+        # Of an accumulator only the risk matters here.
+        counted = Accumulator(None, self.risk, 0.0).counted(samples, moving(U))  # type: ignore[arg-type]
+        if not counted.any():
+            raise DataError(NO_DIRECTION)
+        weights = np.ones(len(X)) if weights is None else weights
+        model = self.place(X[counted], U.shape[1], weights[counted])
+        return Accumulator(model, self.risk, self.alpha)
+
+    def resume(self) -> Accumulator:
+        """A copy of the sums that this policy was solved from, to be added to.
+
+        Returns
+        -------
+        Accumulator
+
+        Raises
+        ------
+        PolicyError
+            The policy was saved without them.
+        """
+        check_is_fitted(self)
+        if not hasattr(self, "accumulator_"):
+            raise PolicyError(
+                "this policy was saved without the sums it was solved from: save it with resumable=True to go on "
+                "learning, or to know how sure it is"
+            )
+        return self.accumulator_.copy()
+
+    def finish(self, accumulator: Accumulator, *, scalar_actions: bool = False) -> Self:
+        """Solve what was added up elsewhere, and become that policy.
+
+        Parameters
+        ----------
+        accumulator : Accumulator
+            From `start` or `resume`.
+        scalar_actions : bool
+            Whether `predict` returns actions of shape (N,).
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        DataError
+            There is nothing to learn from; the policy then stays as it was.
+        """
+        fresh = copy(self)
+        fresh.n_features_in_ = accumulator.model.n_states
+        return self._adopt_from(fresh, accumulator, scalar_actions)
+
+    def predict(
+        self, X: ArrayLike, return_std: bool = False, return_cov: bool = False
+    ) -> Any:  # an array, or two of them
+        """Actions of the unconstrained policy.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        return_std : bool
+            Return also how far the policy may be from that, as standard deviations of the actions' shape.
+        return_cov : bool
+            Return also the covariances of all actions. Not both.
+
+        Returns
+        -------
+        U : array (N, d)
+            Or (N,), where the policy was fitted to actions of that shape.
+        spread : array (N, d) or (N, d, d)
+            Where asked for; see `fitting.posterior`.
+
+        Raises
+        ------
+        DataError
+            The states are not finite or not of the dimension learnt.
+        PolicyError
+            Both spreads are asked for, or the policy was saved without its sums.
         """
         check_is_fitted(self)
         if return_std and return_cov:
@@ -96,30 +282,73 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
                 "ask for return_std or return_cov, not both: the deviations are the roots of the covariance's diagonal"
             )
         X = check_states(self, X)
-        actions = self._evaluate(X)
+        actions = self.model_.evaluate(X, self.solution_.w)
         if not (return_std or return_cov):
             return actions[:, 0] if self.actions_are_scalars_ else actions
-        covariance = self._deviation(X, actions, self.posterior())
+        covariance = self.model_.covariance(X, actions, self.posterior())
         spread = covariance if return_cov else np.sqrt(np.maximum(np.einsum("njj->nj", covariance), 0.0))
         if self.actions_are_scalars_:
             return actions[:, 0], spread.reshape(len(X))
         return actions, spread
 
     def posterior(self) -> Posterior:
-        """What the samples say of the parameters and of their own noise: see `uncertainty`. Costs a decomposition.
+        """What the samples say of the parameters and of their own noise. Costs an eigendecomposition.
 
         Each sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
         more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
+
+        Returns
+        -------
+        Posterior
+            See `fitting.posterior`.
+
+        Raises
+        ------
+        PolicyError
+            The policy was saved without its sums.
+        """
+        return Posterior.of(self.resume().moments(), self.n_actions_ if self.risk == "direct" else 1)
+
+    def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:
+        """How far the true policy may be from `predict`.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        posterior : Posterior, optional
+            By default that of the samples learnt from.
+
+        Returns
+        -------
+        array (N, d, d)
+            Second moments of the deviation, in squared units of the action.
         """
         check_is_fitted(self)
-        seen = Moments.sum([fold for fold in self.moments_ if fold is not None])
-        return Posterior.of(seen, self.n_actions_ if self.risk == "direct" else 1)
+        X = check_states(self, X)
+        actions = self.model_.evaluate(X, self.solution_.w)
+        return self.model_.covariance(X, actions, self.posterior() if posterior is None else posterior)
 
-    def score(self, X, y, sample_weight=None) -> float:
-        """Share of observed motion explained, `1 - Σ (r - û·pi(x))² / Σ r²`, at most 1.
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+        """Share of observed motion explained, `1 - Σ (r - û·π(x))² / Σ r²`, whatever risk the policy was fitted with.
 
-        Whatever risk the policy was fitted with, so that policies can be compared. X (N, n), y (N, d) or (N,),
-        sample_weight (N,). Raises `DataError` where nothing moves.
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        y : array (N, d) or (N,)
+            Actions.
+        sample_weight : array (N,), optional
+
+        Returns
+        -------
+        float
+            At most 1.
+
+        Raises
+        ------
+        DataError
+            Nothing moves.
         """
         U = check_actions(y)
         P = check_actions(self.predict(X), "predictions")
@@ -128,7 +357,44 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
             U, P = U * root, P * root
         return metrics.explained(U, P)
 
-    def save(self, path: str | Path, *, resumable: bool = False) -> None:
+    def rollout(
+        self,
+        start: ArrayLike,
+        steps: int = 500,
+        dt: float = 0.02,
+        constraint: Any = None,
+        *,
+        stop_when: Callable[[np.ndarray], ArrayLike] | None = None,
+    ) -> Demonstrations:
+        """Follow the policy through time, freely or under a constraint; see `simulation.rollout`.
+
+        Parameters
+        ----------
+        start : array (n,) or (S, n)
+            One start, or several that are followed side by side.
+        steps : int
+            Number of steps.
+        dt : float
+            Duration of a step, in seconds.
+        constraint : array (k, n) or callable, optional
+            Rows `A` with `A u = 0`, or a function that returns them for states (S, n).
+        stop_when : callable, optional
+            Is given the current states (S, n); where it says true for any of them the movement ends.
+
+        Returns
+        -------
+        Demonstrations
+
+        Raises
+        ------
+        PolicyError, DataError, UnconstrainError
+            As for `simulation.rollout`.
+        """
+        from unconstrain.simulation import rollout
+
+        return rollout(self, start, steps, dt, constraint, stop_when=stop_when)
+
+    def save(self, path: str | PathLike[str], *, resumable: bool = False) -> None:
         """Write the policy to a file that `load_policy` reads. Nothing in it is code.
 
         Parameters
@@ -136,7 +402,7 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         path : path
             Customarily it ends in ``.skops``. An existing file is replaced.
         resumable : bool
-            Keep the moments too. Without them the file is small, and the policy that is read back predicts, but cannot
+            Keep the sums too. Without them the file is small, and the policy that is read back predicts, but cannot
             learn on (`partial_fit`), tell how sure it is (`return_std`), or be solved anew (`solved`).
 
         Raises
@@ -146,217 +412,179 @@ class Policy(RegressorMixin, BaseEstimator, ABC):
         """
         check_is_fitted(self)
         kept = copy(self)
-        if not resumable:
-            for name in ADDED_UP:
-                kept.__dict__.pop(name, None)
+        if not resumable and hasattr(kept, "accumulator_"):
+            del kept.accumulator_
         save_object(path, Kind.POLICY, kept, check_usable)
 
-    def __getattr__(self, name: str):
-        if name in ADDED_UP and "n_samples_seen_" in vars(self):
-            raise PolicyError(
-                "this policy was saved without its moments, which learning on, uncertainty and solving anew need: "
-                "save it with save(path, resumable=True)"
-            )
-        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}", name=name, obj=self)
-
-    def compile(self) -> CompiledPolicy:
+    def compile(self) -> "CompiledPolicy":
         """The fitted policy for a control loop: `step = policy.compile()`; `step(x)` for states (n,) or (N, n).
 
-        A small immutable callable that does not need scikit-learn and agrees with `predict` to 1e-12 of the largest
-        term either adds up, which is checked here. See `CompiledPolicy`. Raises `PolicyError` for features that
-        cannot be compiled.
+        Returns
+        -------
+        CompiledPolicy
+            A small immutable callable that does not need scikit-learn and agrees with `predict` to 1e-12 of the largest
+            term either adds up, which is checked here.
+
+        Raises
+        ------
+        PolicyError
+            The features cannot be compiled.
         """
-        return compilation.compile_policy(self)
+        from unconstrain.deploy.compilation import compile_policy
 
-    def to_onnx(self, path: str | Path) -> None:
-        """Write the policy to `path` as an ONNX model: input "x" (batch, n), output "u" (batch, d), float64.
+        return compile_policy(self)
 
-        Needs the extra `onnx`. Raises `PolicyError` without it, and for policies that are neither linear, nor of
-        normalised RBFs, nor locally linear.
+    def to_onnx(self, path: str | PathLike[str]) -> None:
+        """Write the policy as an ONNX model: input "x" (batch, n), output "u" (batch, d), float64.
+
+        Parameters
+        ----------
+        path : path
+
+        Raises
+        ------
+        PolicyError
+            The extra `onnx` is not installed, or the policy is neither linear, nor of normalised RBFs, nor locally
+            linear.
         """
-        onnx.save(self.compile(), path)
+        from unconstrain.deploy import onnx
 
-    def solved(self, *, without: int | None = None):
+        onnx.save(self.compile(), Path(path))
+
+    def solved(self, *, without: int | None = None) -> Self:
         """A copy of this fitted policy, solved anew for its `alpha`, leaving out the samples of one fold if asked.
 
-        With `alpha="cv"` λ is chosen anew as well, among the folds left. Costs no pass over the data: it is what
-        makes cross-validation of a whole policy cheap. Raises `DataError` where nothing is left to learn from.
+        Parameters
+        ----------
+        without : int, optional
+            The fold left out. With `alpha="cv"` λ is then chosen among the others.
+
+        Returns
+        -------
+        Policy
+
+        Raises
+        ------
+        DataError
+            Nothing is left to learn from.
+        PolicyError
+            The policy was saved without its sums.
+
+        Notes
+        -----
+        It costs no pass over the data: it is what makes cross-validation of a whole policy cheap.
         """
-        check_is_fitted(self)
+        accumulator = self.resume()
         left = copy(self)
-        left.moments_ = [None if k == without else part for k, part in enumerate(self.moments_)]
-        if not any(part is not None for part in left.moments_):
-            raise DataError(
-                "all motion lies in one fold, so none is left without it: give more episodes, or no groups"
-            )
-        left._solve()
+        left.solution_ = accumulator.solve(self.alpha, without)
         return left
 
-    @abstractmethod
-    def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:
-        """Fix what depends on data before any sample is added."""
-
-    def _placed_by_data(self) -> bool:
-        """Whether `_place` depends on where the states lie, and not just on their dimension."""
-        return True
-
-    @abstractmethod
-    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None) -> Moments:
-        """The samples, added up, whatever precision they come in."""
-
-    @abstractmethod
-    def _take_up(self, w: np.ndarray) -> None:
-        """Keep the solution w (..., P), in the order of the rows of W, as learnt attributes."""
-
-    @abstractmethod
-    def _parameters(self) -> np.ndarray:
-        """What `_take_up` took up: w (..., P), in the order of the rows of W."""
-
-    @abstractmethod
-    def _evaluate(self, X: np.ndarray) -> np.ndarray:
-        """Actions (N, d) at checked states X (N, n)."""
-
-    @abstractmethod
-    def _deviation(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
-        """Second moments (N, d, d) of what separates the policy from predictions P (N, d), at checked states."""
-
-    def _add(self, X, y, groups, sample_weight, projections, *, first: bool):
-        self._check_options()
-        U = check_actions(y)
-        weights = check_weights(sample_weight, X)
-        groups = check_groups(groups, len(X))
-        N = self._checked_projections(projections, U)
-        if not first and U.shape[1] != self.n_actions_:
-            raise DataError(
-                f"actions have {U.shape[1]} dimensions, but this policy has learnt {self.n_actions_}"
-            )
-        longest = max(np.linalg.norm(U, axis=1).max(), 0.0 if first else self.longest_action_)
-        if first:
-            counted = self._counted(moving(U, longest), weights, N)
-            if not counted.any():
-                raise DataError(NO_DIRECTION)
-            self._begin(X[counted], U.shape[1], weights[counted], scalars=np.ndim(y) == 1)
-        fold = self.folds_.assign(groups, len(X)) if self.alpha == "cv" else None
-        self._include(self._tally(X, U, fold, weights, N, longest))
-        self._solve()
-        return self
-
-    def _check_options(self) -> None:
+    def check_options(self) -> None:
+        """Raise `PolicyError` for a risk or a weight decay that is none."""
         check_choice(self.risk, "risk", RISKS)
         if isinstance(self.alpha, str):
             check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
         else:
             check_number(self.alpha, "alpha", positive=False)
 
-    def _begin(self, X: np.ndarray, d: int, weights: np.ndarray, *, scalars: bool) -> None:
-        """Place what depends on data by states X (N, n), weighted (N,), and forget what was added before."""
-        self._place(X, d, weights)
-        self.moments_ = []
-        self.n_actions_ = d
-        self.actions_are_scalars_ = scalars
-        self.n_samples_seen_, self.n_zero_actions_, self.n_known_constraints_ = 0, 0, 0
-        self.longest_action_, self.shortest_action_ = 0.0, math.inf
-        if self.alpha == "cv":
-            self.folds_ = selection.EpisodeFolds()
+    @property
+    def n_actions_(self) -> int:
+        """Dimension of the actions, d."""
+        return self.model_.n_actions
 
-    def _tally(
-        self,
-        X: np.ndarray,
-        U: np.ndarray,
-        fold: np.ndarray | None = None,
-        weights: np.ndarray | None = None,
-        projections: np.ndarray | None = None,
-        longest: float = 0.0,
-    ) -> Tally:
-        """What checked samples add, by fold (N,), once all is placed. Changes nothing here, so threads may share it.
+    @property
+    def alpha_(self) -> float:
+        """The weight decay λ that was used."""
+        return self.solution_.alpha
 
-        `longest`: the longest action known so far, if that is not among these.
-        """
-        r = lengths(U)
-        longest = max(float(r.max(initial=0.0)), longest)
-        moves = r > NO_MOTION * longest
-        counted = self._counted(moves, weights, projections)
-        seen = sight(self.risk, U, projections, np.where(moves, r, 0.0))
-        moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
-        for k in [0] if fold is None else np.unique(fold[counted]):
-            rows = counted if fold is None else counted & (fold == k)
-            if not rows.any():
-                continue
-            if rows.all():
-                moments[k] = self._moments(X, seen, weights)
-            else:
-                index = np.flatnonzero(rows)
-                taken = None if weights is None else weights[index]
-                # Stored a row a dimension, along which sums run.
-                moments[k] = self._moments(X.T.take(index, axis=1).T, seen[index], taken)
-        return Tally(
-            tuple(moments),
-            n_samples=len(U),
-            n_zero=len(U) - int(np.count_nonzero(moves)),
-            longest=longest,
-            shortest=float(r.min(initial=math.inf, where=moves)),
-            n_known=0 if projections is None else int(np.count_nonzero(~unknown(projections))),
-        )
+    @property
+    def alphas_(self) -> np.ndarray:
+        """The candidates for λ, (25,), where it was chosen."""
+        return _where_chosen(self.solution_.alphas, "alphas_")
 
-    def _counted(
-        self, moves: np.ndarray, weights: np.ndarray | None, projections: np.ndarray | None
-    ) -> np.ndarray:
-        """Which samples say something, (N,): without motion or a projection there is no direction to say it of."""
-        if self.risk == "auto" and projections is not None:
-            moves = moves | informative(projections)
-        counted = np.ones_like(moves) if self.risk in ("direct", "constrained") else moves
-        return counted if weights is None else counted & (weights > 0)
+    @property
+    def held_out_risk_(self) -> np.ndarray:
+        """The held-out risk of each candidate for λ, (25,), in squared units of the action, where it was chosen."""
+        return _where_chosen(self.solution_.held_out_risk, "held_out_risk_")
 
-    def _include(self, tally: Tally) -> None:
-        total = Tally(
-            tuple(self.moments_),
-            n_samples=self.n_samples_seen_,
-            n_zero=self.n_zero_actions_,
-            longest=self.longest_action_,
-            # Policies saved before these were kept know no shorter one than any, and of no constraint.
-            shortest=getattr(self, "shortest_action_", math.inf),
-            n_known=getattr(self, "n_known_constraints_", 0),
-        )
-        total += tally
-        self.moments_ = list(total.moments)
-        self.n_samples_seen_, self.n_zero_actions_ = total.n_samples, total.n_zero
-        self.longest_action_, self.shortest_action_ = total.longest, total.shortest
-        self.n_known_constraints_ = total.n_known
+    @property
+    def n_samples_seen_(self) -> int:
+        """How many samples the policy has learnt from, including those without motion."""
+        return self.solution_.n_samples
 
-    def _check_uses_projections(self) -> None:
-        if self.risk not in ("auto", "constrained"):
-            raise PolicyError(
-                f'projections are for risk="auto" and "constrained", and this policy has risk="{self.risk}"'
-            )
+    @property
+    def n_zero_actions_(self) -> int:
+        """How many of them have no direction; the inconsistency leaves them out."""
+        return self.solution_.n_zero
 
-    def _checked_projections(self, projections, U: np.ndarray) -> np.ndarray | None:
-        if projections is None:
-            if self.risk == "constrained":
-                raise PolicyError(
-                    'risk="constrained" needs the projections of the samples: fit(X, U, projections=N)'
-                )
-            return None
-        self._check_uses_projections()
-        return check_projections(projections, *U.shape, unknown=self.risk == "auto")
+    @property
+    def n_known_constraints_(self) -> int:
+        """Of how many of them the projection was known."""
+        return self.solution_.n_known
 
-    def _solve(self) -> None:
-        folds = [fold for fold in self.moments_ if fold is not None]
-        total = Moments.sum(folds)
-        if self.alpha == "cv":
-            spectrum = total.decompose()
-            chosen = selection.choose_alpha(folds, float(spectrum.values.max()))
-            self.alpha_, self.alphas_, self.held_out_risk_ = chosen
-            w = spectrum.solve([self.alpha_])[..., 0, :]
-        else:
-            self.alpha_ = float(self.alpha)
-            w = total.solve(self.alpha_)
-        self._take_up(w.swapaxes(-1, -2).reshape(*w.shape[:-2], -1))
+    @property
+    def moments_(self) -> list[Moments | None]:
+        """The moments by fold; None where a fold has no samples."""
+        return list(self.resume().total.moments)
 
-    def __sklearn_tags__(self):
+    def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.target_tags.single_output = True
         tags.target_tags.multi_output = True
         return tags
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return "solution_" in vars(self)
+
+    def _check(
+        self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
+    ) -> tuple[Samples, bool]:
+        """The samples, checked, and whether actions are of shape (N,). Learns the number of states where `first`."""
+        self.check_options()
+        if isinstance(X, Demonstrations):
+            X, y, groups, projections = self._of_demonstrations(X, y, groups, projections)
+        X, y = check_samples(self, X, y, reset=first, min_samples=2 if first else 1)
+        U = check_actions(y)
+        if not first and U.shape[1] != self.n_actions_:
+            raise DataError(
+                f"actions have {U.shape[1]} dimensions, but this policy has learnt {self.n_actions_}"
+            )
+        if projections is not None:
+            if self.risk == "direct":
+                raise PolicyError(
+                    'projections= are for risk="inconsistency", and this policy has risk="direct", which looks at the '
+                    "whole action"
+                )
+            projections = check_projections(projections, *U.shape, unknown=True)
+        weights = None if sample_weight is None else check_weights(sample_weight, X)
+        return Samples(X, U, check_groups(groups, len(X)), projections, weights), np.ndim(y) == 1
+
+    def _of_demonstrations(
+        self, demos: Demonstrations, y: Any, groups: Any, projections: Any
+    ) -> tuple[np.ndarray, np.ndarray, Any, Any]:
+        if y is not None:
+            raise DataError("demonstrations bring their own actions: give fit(demos), or fit(X, U)")
+        if groups is None and demos.n_episodes > 1:
+            groups = demos.episodes
+        if projections is None and self.risk != "direct":
+            projections = demos.projections
+        return demos.states, demos.actions, groups, projections
+
+    def _adopt_from(self, fresh: Self, accumulator: Accumulator, scalars: bool) -> Self:
+        """Become the policy that was prepared on a copy. Nothing here changes before all of it has succeeded."""
+        fresh.model_, fresh.accumulator_ = accumulator.model, accumulator
+        fresh.solution_, fresh.actions_are_scalars_ = accumulator.solve(), scalars
+        for name, value in vars(fresh).items():
+            setattr(self, name, value)
+        if not hasattr(fresh, "feature_names_in_") and hasattr(self, "feature_names_in_"):
+            del self.feature_names_in_
+        return self
+
+
+def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:
+    if value is None:
+        raise AttributeError(f'{name} is there only after a fit with alpha="cv"')
+    return value
 
 
 def check_usable(policy: Policy) -> None:

@@ -1,46 +1,72 @@
-"""Local linear models, each learnt alone, blended by their receptive fields. Source: ICRA 2009, Sec. III-B."""
+"""Local models, each learnt alone, blended by their receptive fields.
+
+References
+----------
+Howard et al., ICRA 2009, Sec. III-B.
+"""
+
+from typing import Any
 
 import numpy as np
 
 from unconstrain.arrays import check_number
-from unconstrain.features.centers import place
-from unconstrain.fitting.accumulate import local_moments
-from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import Sight
-from unconstrain.fitting.posterior import Posterior, local_covariance
+from unconstrain.features.base import Features, fit_features
+from unconstrain.features.centers import place as place_centers
+from unconstrain.features.full import as_features
+from unconstrain.fitting.model import LocalModels, Model
 from unconstrain.policies.base import Policy
-from unconstrain.receptive import normalized_activations
-
-BLOCK_ROWS = 4096
 
 
 class LocallyLinearPolicy(Policy):
-    """`pi(x) = Σ_m ω_m(x) B_m (x, 1)`, with `ω_m = K_m / Σ_j K_j` and `K_m(x) = exp(-‖x - c_m‖² / 2σ²)`.
+    """The policy `π(x) = Σ_m ω_m(x) B_m (x, 1)`, with `ω_m = K_m / Σ_j K_j` and `K_m(x) = exp(-‖x - c_m‖² / 2σ²)`.
 
     Each B_m minimises the risk with its samples weighted by K_m, whatever the other models do.
 
-    width: σ, in the states' unit. None takes the width at which `n_centers` models reach the coverage, or, for other
+    Parameters
+    ----------
+    features : transformer, Features, or None
+        What each local model is made of, as for `ParametricPolicy`; None for the linear features `(x, 1)`.
+    width : float, optional
+        σ, in the states' unit. None takes the width at which `n_centers` models reach the coverage, or, for other
         placements, 1.5 times the centres' mean spacing.
-    centers: "coverage", "kmeans", "grid", or an array (M, n).
-    coverage: every sample has a weight of at least this in some model; with a width given it sets their number.
-    n_centers: how many models, where neither a width nor the centres themselves say so.
-    risk, alpha: as for `ParametricPolicy`; one λ for all models.
-    random_state: for "kmeans".
+    centers : {"coverage", "kmeans", "grid"} or array (M, n)
+        Where the models lie.
+    coverage : float
+        Every sample has a weight of at least this in some model; with a width given it sets their number.
+    n_centers : int
+        How many models, where neither a width nor the centres themselves say so.
+    risk, alpha
+        As for `ParametricPolicy`; one λ for all models.
+    random_state : int, optional
+        For "kmeans".
 
-    After `fit`: `centers_` (M, n), `width_`, `coef_` (M, d, n), `intercept_` (M, d), and what `ParametricPolicy` lists.
+    Attributes
+    ----------
+    centers_ : array (M, n)
+    width_ : float
+    weights_ : array (M, P)
+        The parameters of each model.
+    coef_ : array (M, d, n)
+        Slopes of linear models; not there for other features.
+    intercept_ : array (M, d)
+        Offsets of linear models.
+    alpha_, alphas_, held_out_risk_, n_samples_seen_, n_zero_actions_, n_known_constraints_
+        As for `ParametricPolicy`.
     """
 
     def __init__(
         self,
+        features: Any = None,
         *,
-        width=None,
-        centers="coverage",
-        coverage=0.7,
-        n_centers=30,
-        risk="auto",
-        alpha=1e-6,
-        random_state=0,
+        width: float | None = None,
+        centers: Any = "coverage",
+        coverage: float = 0.7,
+        n_centers: int = 30,
+        risk: str = "inconsistency",
+        alpha: float | str = "cv",
+        random_state: int | None = 0,
     ):
+        self.features = features
         self.width = width
         self.centers = centers
         self.coverage = coverage
@@ -49,39 +75,80 @@ class LocallyLinearPolicy(Policy):
         self.alpha = alpha
         self.random_state = random_state
 
-    def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:
-        self.centers_, self.width_ = place(
+    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
+        """Place the centres and fit the features.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States, checked.
+        d : int
+            Dimension of the actions.
+        sample_weight : array (N,)
+
+        Returns
+        -------
+        LocalModels
+
+        Raises
+        ------
+        PolicyError
+            The options place no centres, or the features do not fit these dimensions.
+        """
+        centers, width = place_centers(
             X,
             self.centers,
             n_centers=self.n_centers,
             width=None if self.width is None else check_number(self.width, "width", positive=True),
             coverage=self.coverage,
-            sample_weight=weights,
+            sample_weight=sample_weight,
             random_state=self.random_state,
         )
+        return LocalModels(fit_features(as_features(self.features), X, d, sample_weight), centers, width, d)
 
-    def _placed_by_data(self) -> bool:
-        return isinstance(self.centers, str) or self.width is None
+    @property
+    def placed_by_data(self) -> bool:
+        """Whether centres, width or features depend on where the states lie."""
+        return self.features is not None or isinstance(self.centers, str) or self.width is None
 
-    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None) -> Moments:
-        return local_moments(self.centers_, self.width_, X, seen, weights)
+    @property
+    def features_(self) -> Features:
+        """The fitted feature map of each model."""
+        return self.model_.features
 
-    def _take_up(self, w: np.ndarray) -> None:
-        models = w.reshape(len(w), self.n_actions_, -1)
-        self.coef_, self.intercept_ = models[:, :, :-1].copy(), models[:, :, -1].copy()
+    @property
+    def centers_(self) -> np.ndarray:
+        """The centres of the receptive fields, (M, n)."""
+        return self._places.centers
 
-    def _parameters(self) -> np.ndarray:
-        return np.concatenate([self.coef_, self.intercept_[:, :, None]], axis=2).reshape(len(self.coef_), -1)
+    @property
+    def width_(self) -> float:
+        """The width σ of the receptive fields, in the states' unit."""
+        return self._places.width
 
-    def _evaluate(self, X: np.ndarray) -> np.ndarray:
-        actions = np.empty((len(X), self.n_actions_))
-        slopes = self.coef_.reshape(-1, X.shape[1]).T
-        for start in range(0, len(X), BLOCK_ROWS):
-            block = X[start : start + BLOCK_ROWS]
-            blend = normalized_activations(block, self.centers_, self.width_)
-            local = (block @ slopes).reshape(len(block), *self.intercept_.shape) + self.intercept_
-            actions[start : start + BLOCK_ROWS] = np.einsum("nm,nmd->nd", blend, local)
-        return actions
+    @property
+    def weights_(self) -> np.ndarray:
+        """The parameters of each model, (M, P)."""
+        return self.solution_.w
 
-    def _deviation(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
-        return local_covariance(self.centers_, self.width_, X, P, posterior)
+    @property
+    def coef_(self) -> np.ndarray:
+        """The slopes of linear models, (M, d, n)."""
+        return self._linear[0]
+
+    @property
+    def intercept_(self) -> np.ndarray:
+        """The offsets of linear models, (M, d)."""
+        return self._linear[1]
+
+    @property
+    def _places(self) -> LocalModels:
+        assert isinstance(self.model_, LocalModels)
+        return self.model_
+
+    @property
+    def _linear(self) -> tuple[np.ndarray, np.ndarray]:
+        linear = self._places.linear_parameters(self.solution_.w)
+        if linear is None:
+            raise AttributeError("coef_ and intercept_ are there only for linear local models, features=None")
+        return linear

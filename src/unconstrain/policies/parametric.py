@@ -1,30 +1,50 @@
-"""`pi(x) = Φ(x) w`: one set of parameters for all states. Source: ICRA 2009, Sec. III-A."""
+"""`π(x) = Φ(x) w`: one set of parameters for all states.
+
+References
+----------
+Howard et al., ICRA 2009, Sec. III-A.
+"""
+
+from typing import Any
 
 import numpy as np
 
-from unconstrain.features.full import as_policy_features
-from unconstrain.fitting.accumulate import parametric_moments
-from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import Sight
-from unconstrain.fitting.posterior import Posterior, parametric_covariance
+from unconstrain.features.base import Features, fit_features
+from unconstrain.features.full import as_features
+from unconstrain.fitting.model import GlobalModel, Model
 from unconstrain.policies.base import Policy
 
 
 class ParametricPolicy(Policy):
-    """The unconstrained policy `pi(x) = W b(x)` behind constrained movements, `w = (H + λI)⁻¹ g`.
+    """The unconstrained policy `π(x) = Φ(x) w` behind constrained movements, `w = (H + λI)⁻¹ g`.
 
-    features: any scikit-learn transformer whose output is `b(x)` (`NormalizedRBF`, `SplineTransformer`, ...), shared
-        by all actions; policy features (see `features.base`); or None for the linear policy, `b(x) = (x, 1)`.
-    risk: "auto" (the inconsistency, which needs only the data; for samples whose constraint is known, given as
-        `projections` to `fit`, the error under it), "inconsistency" (whatever is known), "direct" (ordinary regression;
-        also the oracle, when fitted to the true policy), or "constrained" (needs the projections of all samples).
-    alpha: the weight decay λ of `E(w) + λ‖w‖²`, with E the sum of squared errors over samples; or "cv" to choose
-        it by held-out risk among 25 values over five folds of episodes.
+    Parameters
+    ----------
+    features : transformer, Features, or None
+        Any scikit-learn transformer whose output is `b(x)` (`NormalizedRBF`, `SplineTransformer`, ...), shared by all
+        actions; a feature map (see `features.base`); or None for the linear policy, `b(x) = (x, 1)`.
+    risk : {"inconsistency", "direct"}
+        "inconsistency" learns from what each action says whatever the constraint was, and from the error under it where
+        its projection is known. "direct" is ordinary regression.
+    alpha : "cv" or float
+        The weight decay λ of `E(w) + λ‖w‖²`, with E the sum of squared errors over samples; "cv" chooses it by held-out
+        risk among 25 values over five folds of episodes.
 
-    After `fit`: `weights_` (P,), `features_`, `alpha_`, `n_zero_actions_` (how many samples have no direction; the
-    inconsistency leaves them out), `n_known_constraints_` (of how many the constraint was known, 0 without
-    projections), `n_samples_seen_`; with "cv" `alphas_` and `held_out_risk_`, (25,).
+    Attributes
+    ----------
+    weights_ : array (P,)
+        The parameters w.
+    features_ : Features
+        The fitted feature map.
+    alpha_ : float
+        The λ used.
+    alphas_, held_out_risk_ : array (25,)
+        The candidates and their held-out risk, with `alpha="cv"`.
+    n_samples_seen_, n_zero_actions_, n_known_constraints_ : int
+        How many samples were learnt from, how many of them have no direction, and of how many the projection was known.
 
+    Examples
+    --------
     >>> import numpy as np, unconstrain as uc
     >>> X = np.random.default_rng(0).normal(size=(200, 2))
     >>> Pi = X @ [[-1.0, 0.5], [-0.5, -1.0]]                      # the policy nobody ever sees whole
@@ -35,28 +55,45 @@ class ParametricPolicy(Policy):
     True
     """
 
-    def __init__(self, features=None, *, risk="auto", alpha=1e-6):
+    def __init__(self, features: Any = None, *, risk: str = "inconsistency", alpha: float | str = "cv"):
         self.features = features
         self.risk = risk
         self.alpha = alpha
 
-    def _place(self, X: np.ndarray, d: int, weights: np.ndarray) -> None:
-        self.features_ = as_policy_features(self.features).fit(X, d, weights)
+    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
+        """Fit the features.
 
-    def _placed_by_data(self) -> bool:
+        Parameters
+        ----------
+        X : array (N, n)
+            States, checked.
+        d : int
+            Dimension of the actions.
+        sample_weight : array (N,)
+
+        Returns
+        -------
+        GlobalModel
+
+        Raises
+        ------
+        PolicyError
+            The features are none, or do not fit these dimensions.
+        """
+        features = fit_features(as_features(self.features), X, d, sample_weight)
+        return GlobalModel(features, X.shape[1], d)
+
+    @property
+    def placed_by_data(self) -> bool:
+        """Whether features may depend on where the states lie: all but those of the linear policy."""
         return self.features is not None
 
-    def _moments(self, X: np.ndarray, seen: Sight, weights: np.ndarray | None = None) -> Moments:
-        return parametric_moments(self.features_, X, seen, weights)
+    @property
+    def weights_(self) -> np.ndarray:
+        """The parameters w, (P,)."""
+        return self.solution_.w
 
-    def _take_up(self, w: np.ndarray) -> None:
-        self.weights_ = w
-
-    def _parameters(self) -> np.ndarray:
-        return self.weights_
-
-    def _evaluate(self, X: np.ndarray) -> np.ndarray:
-        return self.features_.evaluate(X, self.weights_)
-
-    def _deviation(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
-        return parametric_covariance(self.features_, X, P, posterior)
+    @property
+    def features_(self) -> Features:
+        """The fitted feature map."""
+        return self.model_.features

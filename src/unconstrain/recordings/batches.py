@@ -10,7 +10,8 @@ import numpy as np
 
 from unconstrain.arrays import check_actions, check_finite, check_groups, check_numbers, check_projections
 from unconstrain.errors import DataError
-from unconstrain.recordings.blocks import Array, Block, Samples
+from unconstrain.recordings.blocks import Array, Block
+from unconstrain.samples import Samples
 
 FORMS = "(X, U), (X, U, groups) or (X, U, groups, projections)"
 
@@ -21,11 +22,10 @@ class Batches:
     given: an iterable of `(X, U)`, `(X, U, groups)` or `(X, U, groups, projections)`, or a function without arguments
         that returns one. A function, and anything that can be iterated anew such as a list, can be read more than
         once; an iterator cannot.
-    complete: whether projections, where they are given, have to be known of every sample.
     """
 
-    def __init__(self, given: Iterable | Callable[[], Iterable], batch_rows: int, *, complete: bool = False):
-        self._given, self._batch_rows, self._complete = given, batch_rows, complete
+    def __init__(self, given: Iterable | Callable[[], Iterable], batch_rows: int):
+        self._given, self._batch_rows = given, batch_rows
         self._held: list[Samples] = []  # what was read of an iterator before its time
         self._rest: Iterator[Samples] | None = None
         self.n_rows: int | None = None
@@ -149,7 +149,7 @@ class Batches:
 
     def _projections(self, given: Any, U: Array, i: int) -> Array:
         try:
-            return check_projections(given, *U.shape, unknown=not self._complete)
+            return check_projections(given, *U.shape, unknown=True)
         except DataError as error:
             raise DataError(f"batch {i} (counted from 0): {error}") from None
 

@@ -2,25 +2,14 @@
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.samples import Samples
+
 Array = NDArray[np.float64]
-
-
-class Samples(NamedTuple):
-    """States (N, n), actions (N, d), and what else is known of them.
-
-    groups: episode labels (N,), None where nothing tells episodes apart. projections: N (N, d, d), NaN where a sample's
-    constraint is not known, None where nothing tells of constraints.
-    """
-
-    states: Array
-    actions: Array
-    groups: NDArray[Any] | None
-    projections: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.fitting.solve import EpisodeFolds
 from unconstrain.recordings import saved
-from unconstrain.recordings.blocks import Array, Block, Samples
+from unconstrain.recordings.blocks import Array, Block
 from unconstrain.recordings.files import Paths
 from unconstrain.recordings.formats import lerobot
 from unconstrain.recordings.known import Known
@@ -24,6 +24,7 @@ from unconstrain.recordings.roles import DIFFERENTIATE, Roles
 from unconstrain.recordings.shards import Field, Piece, Shards
 from unconstrain.recordings.stamps import seconds
 from unconstrain.recordings.table import Column, Table
+from unconstrain.samples import Samples
 
 HEAD_ROWS = 2
 
@@ -244,10 +245,8 @@ class Dataset:
         return seconds(table, 0, codes, how.time_unit)[0]
 
 
-def opened(source: Paths, reading: Reading, batch_rows: int, *, complete: bool = False) -> Dataset:
+def opened(source: Paths, reading: Reading, batch_rows: int) -> Dataset:
     """The files of `source` with their columns in their roles; see `fit_stream` for what may be given.
-
-    complete: whether the constraint of every sample has to be known, where columns tell of it.
 
     Raises `DataError` for files that cannot be read, and columns that do not exist or are not given.
     """
@@ -295,7 +294,7 @@ def opened(source: Paths, reading: Reading, batch_rows: int, *, complete: bool =
         None if episode is None else _whole_column(table, "episode", episode),
         batch_rows,
         restarts,
-        Known.asked(reading, fields, schema, n_actions, complete),
+        Known.asked(reading, fields, schema, n_actions),
     )
 
 

@@ -11,7 +11,6 @@ from unconstrain.arrays import NOT_IDEMPOTENT, not_idempotent
 from unconstrain.constraints import from_recording
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.fitting.observation import unknown
 from unconstrain.recordings.blocks import Array
 from unconstrain.recordings.reading import Reading
 from unconstrain.recordings.shards import Field, Piece, Shards
@@ -23,7 +22,6 @@ class Known:
 
     projections: one column of lists of d² numbers, row by row, or d² columns; empty or NaN where not known.
     force, force_threshold, free: columns of forces and of flags, of which `constraints.from_recording` makes them.
-    complete: whether the constraint of every sample has to be known.
     """
 
     d: int
@@ -31,7 +29,6 @@ class Known:
     force: tuple[Field, ...] = ()
     force_threshold: float | None = None
     free: tuple[Field, ...] = ()
-    complete: bool = False
 
     @classmethod
     def asked(
@@ -40,14 +37,13 @@ class Known:
         fields: Callable[[str, Any], tuple[Field, ...]],
         schema: pa.Schema,
         d: int,
-        complete: bool,
     ) -> "Known | None":
         """What `reading` names, or None where it names nothing of the kind; `fields` finds the columns of a role.
 
         Raises `DataError` for columns that do not exist, or are not as many as d actions need.
         """
         if reading.projections is not None:
-            return cls(d, _matrix_columns(reading.projections, fields, schema, d), complete=complete)
+            return cls(d, _matrix_columns(reading.projections, fields, schema, d))
         if reading.force is None and reading.free is None:
             return None
         force = () if reading.force is None else fields("force", reading.force)
@@ -59,7 +55,7 @@ class Known:
         free = () if reading.free is None else fields("free", reading.free)
         if len(free) > 1:
             raise DataError(f"free takes one column, but {reading.free!r} stands for {len(free)}")
-        return cls(d, (), force, reading.force_threshold, free, complete)
+        return cls(d, (), force, reading.force_threshold, free)
 
     @property
     def columns(self) -> list[str]:
@@ -88,33 +84,21 @@ class Known:
     def of(self, demos: Demonstrations, shown: str) -> Array:
         """The projections (N, d, d) of demonstrations that hold what was told; NaN where not known.
 
-        `shown` is where they are from. Raises `DataError` where some are not known that have to be.
+        `shown` is where they are from.
         """
         if self.projections:
             assert demos.projections is not None
             return demos.projections
-        N = from_recording(demos, force_threshold=self.force_threshold)
-        missing = np.count_nonzero(unknown(N)) if self.complete else 0
-        if missing:
-            raise DataError(
-                f"{shown}: forces and flags leave open the constraint of {missing} samples, and "
-                'risk="constrained" needs it of all: choose risk="auto", which does without'
-            )
-        return N
+        return from_recording(demos, force_threshold=self.force_threshold)
 
     def _projections(self, shards: Shards, piece: Piece) -> Array:
         N = shards.sparse(piece, self.projections, self.d**2)
-        missing = np.asarray(np.isnan(N).all(axis=1))
-        bad = ~np.isfinite(N).all(axis=1) & (~missing | self.complete)
+        bad = ~np.isfinite(N).all(axis=1) & ~np.isnan(N).all(axis=1)
         if bad.any():
             at = int(np.argmax(bad))
-            what = (
-                'not known, and risk="constrained" needs it of all samples: choose risk="auto", which does without'
-                if missing[at]
-                else "neither finite numbers throughout nor NaN throughout: correct it, or make all of it NaN"
-            )
             raise DataError(
-                f"{shards.name(piece.file)}: the projection at row {piece.first + at} (counted from 0) is {what}"
+                f"{shards.name(piece.file)}: the projection at row {piece.first + at} (counted from 0) is neither "
+                "finite numbers throughout nor NaN throughout: correct it, or make all of it NaN"
             )
         N = N.reshape(-1, self.d, self.d)
         odd = not_idempotent(N)

@@ -1,6 +1,6 @@
 """Where a stream stands, in a file: what was added up, what was placed, and up to which row.
 
-An archive that holds the policy with everything placed and its episodes dealt out to folds, and the moments by fold.
+An archive that holds the accumulator with everything placed and its episodes dealt out to folds, and the sums so far.
 """
 
 import os
@@ -10,25 +10,53 @@ from typing import Any
 import joblib
 
 from unconstrain.errors import UnconstrainError
-from unconstrain.fitting.tally import Tally
+from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
 from unconstrain.storage import Kind, foreign_parts, load_object, save_object
 
 
 @dataclass(frozen=True)
 class Progress:
-    """A policy with everything placed, what the rows before `done` add to it, and the longest action known before."""
+    """How far a stream has come.
 
-    policy: Policy
-    tally: Tally
+    Parameters
+    ----------
+    accumulator : Accumulator
+        With everything placed and all episodes so far dealt out, as it was before the stream.
+    sums : Sums
+        What the rows before `done` add.
+    done : int
+        The row to go on from.
+    """
+
+    accumulator: Accumulator
+    sums: Sums
     done: int
-    longest: float
 
 
-def identity(policy: Policy, source: str, settings: dict[str, Any]) -> dict[str, str]:
-    """What a checkpoint belongs to: the policy as given, the source, and the settings on which the result depends."""
+def identity(policy: Policy, source: str, settings: dict[str, Any], partial: bool) -> dict[str, str]:
+    """Describe what a checkpoint belongs to.
+
+    Parameters
+    ----------
+    policy : Policy
+        As given.
+    source : str
+        What identifies the data.
+    settings : dict
+        The settings on which the result depends.
+    partial : bool
+        Whether the stream goes on from what the policy has learnt.
+
+    Returns
+    -------
+    dict of str
+        A digest of each.
+    """
     learnt = [
-        (part.H, part.g) if part is not None else None for part in getattr(policy, "moments_", None) or []
+        None if part is None else (part.H, part.g)
+        for part in (policy.moments_ if partial and hasattr(policy, "accumulator_") else [])
     ]
     about = (type(policy).__name__, policy.get_params(deep=True), learnt)
     return {"policy": joblib.hash(about), "source": joblib.hash(source), "settings": joblib.hash(settings)}
@@ -87,7 +115,7 @@ def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy
 
 
 def _check(found: dict[str, Any]) -> None:
-    kinds = {"policy": Policy, "tally": Tally, "done": int, "longest": float}
+    kinds = {"accumulator": Accumulator, "sums": Sums, "done": int}
     if set(found) != {"belongs_to", *kinds} or set(found["belongs_to"]) != {"policy", "source", "settings"}:
         raise TypeError("it holds other things than a checkpoint")
     wrong = [name for name, kind in kinds.items() if not isinstance(found[name], kind)]

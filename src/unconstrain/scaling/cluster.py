@@ -10,7 +10,6 @@ import logging
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,23 +17,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.solve import EpisodeFolds
-from unconstrain.fitting.tally import Tally
 from unconstrain.policies.base import Policy
 from unconstrain.progress import Report, reporting
 from unconstrain.recordings.dataset import Dataset
 from unconstrain.recordings.reading import Reading
 from unconstrain.recordings.roles import Keys
 from unconstrain.recordings.table import Key
-from unconstrain.scaling.stream import (
-    BATCH_ROWS,
-    SAMPLE_ROWS,
-    begin,
-    finish,
-    fold_of_samples,
-    prepared,
-    tally_of,
-)
+from unconstrain.scaling.stream import BATCH_ROWS, SAMPLE_ROWS, begin, deal, finish, open_source
 
 PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
 
@@ -46,14 +37,6 @@ class Part:
     start: int
     stop: int
     fold_of: dict[Any, int] | None
-
-
-@dataclass(frozen=True)
-class Sum:
-    """What consecutive parts add, and how many episodes were dealt out on the spot while adding them up."""
-
-    tally: Tally
-    n_dealt: int = 0
 
 
 def fit(
@@ -97,23 +80,20 @@ def fit(
         force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
         min_duration=min_duration,
     )  # fmt: skip
-    work, opened = prepared(policy, source, reading, batch_rows, partial=partial)
+    opened = open_source(policy, source, reading, batch_rows)
     if not isinstance(opened, Dataset):
         raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
-    longest = begin(work, opened, sample_rows, random_state, partial=partial)
+    accumulator = begin(policy, opened, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
     rows = part_rows or max(batch_rows, -(-opened.n_rows // (PARTS_PER_THREAD * threads)))
-    parts = list(divided(opened, rows, work.folds_ if work.alpha == "cv" else None))
+    parts = list(divided(opened, rows, accumulator.folds))
     with reporting(progress) as report:
-        total = _added_up(client, work, opened, parts, longest, report)
-        if total.tally.misjudged:
-            total = _added_up(client, work, opened, parts, total.tally.longest, report)
-    tally = total.tally
-    if total.n_dealt:
-        known = len(work.folds_.fold_of)
-        tally = tally.dealt_from(known % work.folds_.n_folds, work.folds_.n_folds)
-        work.folds_.assign(np.array([f"derived {known + i}" for i in range(total.n_dealt)]), total.n_dealt)
-    return finish(policy, work, tally)
+        added = _added_up(client, accumulator.empty(), opened, parts, report)
+        if added.total.misjudged:
+            again = accumulator.empty(longest=added.total.longest)
+            added = _added_up(client, again, opened, parts, report)
+    accumulator.merge(added)
+    return finish(policy, accumulator, opened)
 
 
 @contextmanager
@@ -205,17 +185,13 @@ def _episode_starts(source: Dataset, rows: int) -> Iterator[int]:
 
 
 def _added_up(
-    client: Any, work: Policy, source: Dataset, parts: list[Part], longest: float, report: Report
-) -> Sum:
+    client: Any, empty: Accumulator, source: Dataset, parts: list[Part], report: Report
+) -> Accumulator:
     import distributed
 
-    sent = copy(work)
-    sent.moments_ = []
-    if work.alpha == "cv":
-        sent.folds_ = EpisodeFolds(work.folds_.n_folds)
     shards = replace(source.shards, threads=False)  # the cluster's tasks are its threads
     # A task, not scattered data: what a lost worker held of it can then be made again.
-    setup = client.submit(_setup, sent, replace(source, shards=shards), longest, pure=False)
+    setup = client.submit(_setup, empty, replace(source, shards=shards), pure=False)
     level = [client.submit(_sum_of_part, setup, part, pure=False) for part in parts]
     rows = {future.key: part.stop - part.start for future, part in zip(level, parts, strict=True)}
     finished = distributed.as_completed(level)
@@ -246,26 +222,21 @@ def _added_up(
         client.cancel([total, *finished.futures])
 
 
-def _setup(policy: Policy, source: Dataset, longest: float) -> tuple[Policy, Dataset, float]:
-    return policy, source, longest
+def _setup(empty: Accumulator, source: Dataset) -> tuple[Accumulator, Dataset]:
+    return empty, source
 
 
-def _sum_of_part(setup: tuple[Policy, Dataset, float], part: Part) -> Sum:
-    given, source, longest = setup
-    policy = copy(given)  # tasks of one worker share what was sent
-    if policy.alpha == "cv":
-        policy.folds_ = EpisodeFolds(given.folds_.n_folds)
-        policy.folds_.fold_of = dict(part.fold_of or {})
-    known = len(part.fold_of or {})
-    total = Tally()
+def _sum_of_part(setup: tuple[Accumulator, Dataset], part: Part) -> Accumulator:
+    empty, source = setup
+    accumulator = empty.empty(part.fold_of)
     with threadpool_limits(1, user_api="blas"):
         for block in source.blocks(part.start, part.stop):
             samples = block.load()
-            fold = fold_of_samples(policy, samples)
-            total += tally_of(policy, samples, fold, longest)
-    return Sum(total, len(policy.folds_.fold_of) - known if policy.alpha == "cv" else 0)
+            accumulator.include(accumulator.sums(samples, deal(accumulator, samples)))
+    return accumulator.without_labels()
 
 
-def _sum_of_two(a: Sum, b: Sum) -> Sum:
-    tally = b.tally.dealt_from(a.n_dealt, EpisodeFolds().n_folds) if a.n_dealt else b.tally
-    return Sum(a.tally + tally, a.n_dealt + b.n_dealt)
+def _sum_of_two(a: Accumulator, b: Accumulator) -> Accumulator:
+    total = a.copy()  # what a task returned may be needed again
+    total.merge(b)
+    return total

@@ -22,16 +22,17 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from unconstrain import atomic
 from unconstrain.arrays import check_samples
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.fitting.tally import Tally
-from unconstrain.motion import moving
-from unconstrain.policies.base import NO_DIRECTION, Policy
+from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.sums import Sums
+from unconstrain.policies.base import Policy
 from unconstrain.progress import Report, reporting
 from unconstrain.recordings import dataset
 from unconstrain.recordings.batches import Batches
-from unconstrain.recordings.blocks import Block, Samples, Source
+from unconstrain.recordings.blocks import Block, Source
 from unconstrain.recordings.reading import Reading
 from unconstrain.recordings.roles import Keys
 from unconstrain.recordings.table import Key
+from unconstrain.samples import Samples
 from unconstrain.scaling import checkpoint as checkpoints
 from unconstrain.scaling.checkpoint import Progress
 
@@ -128,17 +129,16 @@ def fit_stream(
         force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
         min_duration=min_duration,
     )  # fmt: skip
-    work, opened = prepared(policy, source, reading, batch_rows, partial=partial)
+    opened = open_source(policy, source, reading, batch_rows)
     settings = {"batch_rows": batch_rows, "sample_rows": sample_rows, "random_state": random_state}
     belongs_to: dict[str, str] = {}
     resumed = None
     if checkpoint is not None:
-        belongs_to = checkpoints.identity(work, opened.identity(), settings)
+        belongs_to = checkpoints.identity(policy, opened.identity(), settings, partial)
         resumed = checkpoints.load(checkpoint, belongs_to, policy)
         atomic.check_writable(checkpoint)
     if resumed is None:
-        longest = begin(work, opened, sample_rows, random_state, partial=partial)
-        resumed = Progress(work, Tally(), 0, longest)
+        resumed = Progress(begin(policy, opened, sample_rows, random_state, partial=partial), Sums(), 0)
 
     def keep(reached: Progress) -> None:
         if checkpoint is not None:
@@ -147,7 +147,7 @@ def fit_stream(
     try:
         with reporting(progress) as report:
             reached = _added_up(opened, resumed, report, keep, checkpoint_seconds)
-            if reached.tally.misjudged:
+            if reached.sums.misjudged:
                 reached = _with_scale_known(opened, reached, report, keep, checkpoint_seconds)
     except _Interrupted as stop:
         rows = f"{stop.done:,}" + (f" of {opened.n_rows:,}" if opened.n_rows else "") + " rows"
@@ -158,103 +158,79 @@ def fit_stream(
         )
         raise KeyboardInterrupt(f"interrupted after {rows}: {how}") from None
     keep(reached)
-    return finish(policy, reached.policy, reached.tally)
+    accumulator = reached.accumulator
+    accumulator.include(reached.sums)
+    return finish(policy, accumulator, opened)
 
 
-def prepared(
-    policy: Policy, source: Any, reading: Reading, batch_rows: int, *, partial: bool
-) -> tuple[Policy, Source]:
-    """The policy to go on with, a copy, and the source, opened; all as for `fit_stream`.
-
-    Raises `PolicyError` for a policy that cannot be learnt from this source.
-    """
+def open_source(policy: Policy, source: Any, reading: Reading, batch_rows: int) -> Source:
+    """The source of a stream, opened. Raises `PolicyError` for a policy that cannot be learnt from it."""
     if not isinstance(policy, Policy):
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")
-    policy._check_options()
-    complete = policy.risk == "constrained"
-    opened = _opened(source, reading, batch_rows, complete)
-    if opened.tells_constraints:
-        policy._check_uses_projections()
-    elif complete:
-        raise PolicyError(
-            'risk="constrained" needs the projections of the samples: name columns with projections=, or with force= '
-            "and free=, or give batches (X, U, groups, projections)"
-        )
-    goes_on = partial and hasattr(policy, "moments_")
-    return deepcopy(policy) if goes_on else clone(policy), opened
+    policy.check_options()
+    opened = _opened(source, reading, batch_rows)
+    if opened.tells_constraints and policy.risk == "direct":
+        raise PolicyError('projections are for risk="inconsistency", and this policy has risk="direct"')
+    return opened
 
 
-def _opened(source: Any, reading: Reading, batch_rows: int, complete: bool) -> Source:
+def _opened(source: Any, reading: Reading, batch_rows: int) -> Source:
     if isinstance(batch_rows, bool) or not isinstance(batch_rows, int | np.integer) or batch_rows < 1:
         raise PolicyError(f"batch_rows must be a whole number of at least 1, got {batch_rows!r}")
     several = (
         isinstance(source, list | tuple) and source and all(isinstance(s, str | os.PathLike) for s in source)
     )
     if isinstance(source, str | os.PathLike) or several:
-        return dataset.opened(source, reading, batch_rows, complete=complete)
+        return dataset.opened(source, reading, batch_rows)
     if reading.columns:
         raise DataError(f"{reading.columns[0]}= chooses a column of files, but the source is not a path")
-    return Batches(source, batch_rows, complete=complete)
+    return Batches(source, batch_rows)
 
 
 def begin(
-    work: Policy, source: Source, sample_rows: int, random_state: int | None, *, partial: bool
-) -> float:
-    """Place what depends on data, on a sample of the source; returns the length of the longest action seen there."""
-    fresh = not (partial and hasattr(work, "moments_"))
-    placed_by_data = fresh and work._placed_by_data()
+    policy: Policy, source: Source, sample_rows: int, random_state: int | None, *, partial: bool
+) -> Accumulator:
+    """An accumulator whose model is placed on a sample of the source, or that goes on from the policy's own sums."""
+    goes_on = partial and hasattr(policy, "model_")
+    placed_by_data = not goes_on and policy.placed_by_data
     X, U = source.sample(max(int(sample_rows), 2), random_state) if placed_by_data else source.head()
-    if U is None:  # to be differentiated
-        X, _ = check_samples(work, X, X, reset=fresh)
-        U = np.ones_like(X)
-        lengths = np.zeros(0)
-    else:
-        X, U = check_samples(work, X, U, reset=fresh)
-        lengths = np.linalg.norm(U, axis=1)
-    if not fresh:
-        if U.shape[1] != work.n_actions_:
+    derived = U is None
+    probe = clone(policy) if not goes_on else deepcopy(policy)
+    X, U = check_samples(probe, X, X if U is None else U, reset=not goes_on)
+    U = np.ones_like(X) if derived else U.reshape(len(U), -1)
+    longest = 0.0 if derived else float(np.linalg.norm(U, axis=1).max(initial=0.0))
+    if goes_on:
+        if U.shape[1] != policy.n_actions_:
             raise DataError(
-                f"actions have {U.shape[1]} dimensions, but this policy has learnt {work.n_actions_}"
+                f"actions have {U.shape[1]} dimensions, but this policy has learnt {policy.n_actions_}"
             )
-        return max(work.longest_action_, float(lengths.max(initial=0.0)))
-    moves = moving(U)
-    states = X[moves] if moves.any() and work.risk not in ("direct", "constrained") else X
-    work._begin(states, U.shape[1], np.ones(len(states)), scalars=source.scalar_actions)
-    return float(lengths.max(initial=0.0))
+        accumulator = policy.resume()
+        longest = max(longest, accumulator.total.longest)
+    else:
+        # Where a sample does not move at all, places are needed all the same.
+        accumulator = policy.start(Samples(X, U if U.any() else np.ones_like(U)))
+    accumulator.longest = max(accumulator.longest, longest)
+    return accumulator
 
 
-def finish(policy: Policy, work: Policy, tally: Tally):
-    """Solve, and give `policy` what `work` has learnt; only here does it change."""
-    before = work.n_samples_seen_
-    if before + tally.n_samples == 0:
+def finish(policy: Policy, accumulator: Accumulator, source: Source) -> Policy:
+    """Solve; only here does the policy change."""
+    total = accumulator.total
+    if total.n_samples == 0:
         raise DataError(
             "no episode has a fragment long enough to be differentiated: raise gap or max_speed, or lower window or "
             "min_duration"
         )
-    if before + tally.n_samples < 2:
+    if total.n_samples < 2:
         raise DataError("one sample (n_samples = 1) is not enough: a policy needs 2 or more")
-    if not before and not tally.n_counted:
-        raise DataError(NO_DIRECTION)
-    work._include(tally)
-    work._solve()
-    policy.__dict__.clear()
-    policy.__dict__.update(work.__dict__)
-    return policy
+    return policy.finish(accumulator, scalar_actions=source.scalar_actions)
 
 
-def fold_of_samples(policy: Policy, samples: Samples):
+def deal(accumulator: Accumulator, samples: Samples) -> NDArray[Any] | None:
     """The fold of each sample, (N,), or None where there are none; new episodes are dealt out."""
-    if policy.alpha != "cv":
-        return None
-    if samples.groups is None:
+    if accumulator.folds is not None and samples.groups is None:
         raise PolicyError('alpha="cv" over a stream needs episodes: give batches (X, U, groups)')
-    return policy.folds_.assign(samples.groups, len(samples.states))
-
-
-def tally_of(policy: Policy, samples: Samples, fold: NDArray[Any] | None, longest: float) -> Tally:
-    """What samples add, by their fold (N,); see `Policy._tally`."""
-    known = samples.projections
-    return policy._tally(samples.states, samples.actions, fold, projections=known, longest=longest)
+    return accumulator.deal(samples)
 
 
 class _Interrupted(Exception):
@@ -268,11 +244,13 @@ def _with_scale_known(source: Source, reached: Progress, report: Report, keep, e
     """A second pass, for the rare stream in which what counts as motion shows only at its end."""
     if not source.repeatable:
         raise DataError(
-            f"an action of length {reached.tally.shortest:.3g} was taken for motion before one of length "
-            f"{reached.tally.longest:.3g} came, beside which it is rounding: leave one of them out, or give a function "
+            f"an action of length {reached.sums.shortest:.3g} was taken for motion before one of length "
+            f"{reached.sums.longest:.3g} came, beside which it is rounding: leave one of them out, or give a function "
             "that returns the batches anew"
         )
-    return _added_up(source, Progress(reached.policy, Tally(), 0, reached.tally.longest), report, keep, every)
+    again = reached.accumulator
+    again.longest = reached.sums.longest
+    return _added_up(source, Progress(again, Sums(), 0), report, keep, every)
 
 
 def _added_up(
@@ -289,21 +267,19 @@ def _added_up(
     blas = [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
     threads = min(blas, default=1)
     loading: deque[tuple[Block, Future[Samples]]] = deque()
-    adding: deque[tuple[Block, Future[Tally]]] = deque()
-    policy = start.policy
+    adding: deque[tuple[Block, Future[Sums]]] = deque()
+    accumulator = start.accumulator
 
-    def deal() -> None:
+    def deal_out() -> None:
         block, loaded = loading.popleft()
         samples = loaded.result()
-        fold = fold_of_samples(policy, samples)
-        added = pool.submit(tally_of, policy, samples, fold, start.longest)
-        adding.append((block, added))
+        adding.append((block, pool.submit(accumulator.sums, samples, deal(accumulator, samples))))
 
     def add() -> None:
         nonlocal reached, kept
         block, work = adding.popleft()
         # One assignment, so that an interruption finds either all of a block in it or nothing.
-        reached = Progress(policy, reached.tally + work.result(), block.stop, start.longest)
+        reached = Progress(accumulator, reached.sums + work.result(), block.stop)
         if clock.monotonic() - kept >= every:
             keep(reached)
             kept = clock.monotonic()
@@ -317,11 +293,11 @@ def _added_up(
             for block in blocks:
                 loading.append((block, pool.submit(block.load)))
                 if len(loading) > threads:
-                    deal()
+                    deal_out()
                 if len(adding) > threads:
                     add()
             while loading:
-                deal()
+                deal_out()
             while adding:
                 add()
     except KeyboardInterrupt:

@@ -9,8 +9,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_actions, check_number, check_samples, check_states
 from unconstrain.errors import DataError
-from unconstrain.features.base import PolicyFeatures
-from unconstrain.features.full import as_policy_features
+from unconstrain.features.base import Features, fit_features
+from unconstrain.features.full import as_features
 from unconstrain.motion import root_mean_square
 
 
@@ -51,7 +51,7 @@ class NullspaceComponent(BaseEstimator):
     """
 
     n_actions_: int
-    features_: PolicyFeatures
+    features_: Features
     weights_: np.ndarray
 
     def __init__(self, features: object = None, alpha: float = 1e-6):
@@ -91,7 +91,7 @@ class NullspaceComponent(BaseEstimator):
             raise DataError("a task and a nullspace component need two or more actions between them, got 1")
         if not U.any():
             raise DataError("all actions are zero: there is nothing to separate")
-        self.features_ = as_policy_features(self.features).fit(X, U.shape[1])
+        self.features_ = fit_features(as_features(self.features), X, U.shape[1])
         self.n_actions_ = U.shape[1]
         scale = root_mean_square(U)
         V = U / scale

@@ -28,8 +28,8 @@ from unconstrain.arrays import check_number
 from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.constraints.learnt.jacobian import JacobianFeatures
 from unconstrain.constraints.learnt.spectrum import count_constrained, format_shares
-from unconstrain.features.base import PolicyFeatures
-from unconstrain.features.full import as_policy_features
+from unconstrain.features.base import Features, fit_features
+from unconstrain.features.full import as_features
 from unconstrain.fitting.solve import EpisodeFolds
 from unconstrain.motion import root_mean_square
 
@@ -88,7 +88,7 @@ class FeatureConstraint(LearntConstraint):
     """
 
     weights_: np.ndarray
-    features_: PolicyFeatures
+    features_: Features
     alphas_: np.ndarray
 
     def __init__(
@@ -130,9 +130,10 @@ class FeatureConstraint(LearntConstraint):
         rhos = RHOS if self.alpha == "cv" else np.array([check_number(self.alpha, "alpha", positive=True)])
         U = U / root_mean_square(U)
         weights = np.sum(U**2, axis=1)
-        self.features_ = _as_row_features(self.features).fit(X, self.n_actions_, weights)
+        self.features_ = fit_features(_as_row_features(self.features), X, self.n_actions_, weights)
+        n_parameters = self.features_.along(X[:1], U[:1]).shape[1]
         fold = EpisodeFolds().assign(groups, len(X))
-        step = -(-len(X) * self.n_actions_ * self.features_.n_parameters_ // NUMBERS)
+        step = -(-len(X) * self.n_actions_ * n_parameters // NUMBERS)
         X, U, fold, weights = X[::step], U[::step], fold[::step], weights[::step]
         phi = np.stack(
             [self.features_.along(X, np.broadcast_to(e, U.shape)) for e in np.eye(self.n_actions_)], axis=1
@@ -298,8 +299,8 @@ def _normalize(rows: np.ndarray) -> np.ndarray:
     return np.divide(rows, length, out=np.zeros_like(rows), where=length > 0)
 
 
-def _as_row_features(given: object) -> PolicyFeatures:
+def _as_row_features(given: object) -> Features:
     """Make features of rows: a function is a Jacobian; anything that can be fitted is as for a policy."""
     if callable(given) and not hasattr(given, "fit"):
         return JacobianFeatures(given)
-    return as_policy_features(given)
+    return as_features(given)

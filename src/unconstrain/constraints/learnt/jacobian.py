@@ -57,7 +57,6 @@ class JacobianFeatures(BaseEstimator):
                 f"the Jacobian must be (samples, task coordinates, {d}) for {d} actions, got shape {J.shape} for "
                 f"{len(X[:2])} samples"
             )
-        self.n_parameters_ = J.shape[1]
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:

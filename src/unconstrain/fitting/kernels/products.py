@@ -49,3 +49,66 @@ def distinct_products(
     if k % 2 == 0:
         np.multiply(once[: k // 2], ring[k // 2 : k], out=products[distances * k :])
     return products
+
+
+def observed_products(
+    rows: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
+) -> np.ndarray:
+    """The distinct entries of `ω QᵀQ`.
+
+    Parameters
+    ----------
+    rows : array (N, k, d)
+        Q.
+    weights : array (N,), optional
+        ω.
+    out : array (d(d+1)/2, N), optional
+        Where they may be written.
+
+    Returns
+    -------
+    array (d(d+1)/2, N)
+        In the order of `pairs`.
+    """
+    if rows.shape[1] == 1:
+        return distinct_products(rows[:, 0], weights, out)
+    i, j = pairs(rows.shape[2])
+    products = np.einsum("nki,nkj->nij", rows, rows)[:, i, j].T
+    return products if weights is None else products * weights
+
+
+def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """`QᵀQ u`.
+
+    Parameters
+    ----------
+    rows : array (N, k, d)
+        Q.
+    targets : array (N, k)
+        `Q u`.
+
+    Returns
+    -------
+    array (N, d)
+    """
+    if rows.shape[1] == 1:
+        return rows[:, 0] * targets
+    return np.einsum("nki,nk->ni", rows, targets)
+
+
+def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
+    """The matrix H from its distinct entries.
+
+    Parameters
+    ----------
+    products : array (..., M(M+1)/2, d(d+1)/2)
+    M, d : int
+        Numbers of features and of actions.
+
+    Returns
+    -------
+    array (..., dM, dM)
+    """
+    over_q = products[..., pair_index(d)]  # (..., pairs of b, d, d)
+    full = np.moveaxis(over_q, -3, -1)[..., pair_index(M)]  # (..., d, d, M, M)
+    return np.ascontiguousarray(full.swapaxes(-2, -3)).reshape(*products.shape[:-2], d * M, d * M)

@@ -1,0 +1,332 @@
+"""The object that every fit drives: it adds samples up, merges with others, and solves.
+
+A fit in memory adds all samples at once. A stream adds them block by block, computing the sums of several blocks at a
+time in threads. A cluster gives each worker an empty copy, and merges what comes back. The result is the same.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from unconstrain.errors import DataError
+from unconstrain.fitting.model import Model
+from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.observation import Observation, informative, observe, unknown
+from unconstrain.fitting.solve import EpisodeFolds, choose_alpha
+from unconstrain.fitting.sums import Sums
+from unconstrain.motion import NO_MOTION, lengths
+from unconstrain.samples import Samples
+
+NO_DIRECTION = (
+    "no action moves, and without motion there is no direction to learn from: check the action columns, or "
+    "differentiate the states over a longer window"
+)
+
+# An action that leaves so few others as motion is a mistake in the data: in a recording of one, rounding is not that
+# common.
+LEAST_MOVING_SHARE, LEAST_MOVING = 0.01, 1
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The parameters that moments determine, and what their choice was based on.
+
+    Parameters
+    ----------
+    w : array (P,) or (S, P)
+        Parameters of the model, or of each of S models.
+    alpha : float
+        λ.
+    alphas, held_out_risk : array (L,), optional
+        The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
+    n_samples, n_zero, n_known : int
+        How many samples were added, how many of them do not move, and of how many the projection is known.
+    """
+
+    w: np.ndarray
+    alpha: float
+    alphas: np.ndarray | None = None
+    held_out_risk: np.ndarray | None = None
+    n_samples: int = 0
+    n_zero: int = 0
+    n_known: int = 0
+
+
+class Accumulator:
+    """Sums of samples under a model, from which its parameters are solved.
+
+    Parameters
+    ----------
+    model : Model
+    risk : {"inconsistency", "direct"}
+    alpha : float or "cv"
+        The weight decay λ; "cv" chooses it by held-out risk, which keeps the sums of each fold apart.
+    longest : float
+        Length of the longest action known beforehand, beside which others have no motion.
+    folds : EpisodeFolds, optional
+        Folds to go on dealing to.
+
+    Attributes
+    ----------
+    folds : EpisodeFolds or None
+        None where λ is a number.
+    total : Sums
+        What was added so far.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        risk: str = "inconsistency",
+        alpha: float | str = "cv",
+        longest: float = 0.0,
+        folds: EpisodeFolds | None = None,
+    ):
+        self.model = model
+        self.risk = risk
+        self.alpha = alpha
+        self.longest = longest
+        self.folds = (folds or EpisodeFolds()) if alpha == "cv" else None
+        self.total = Sums()
+
+    def add(self, samples: Samples) -> None:
+        """Add samples up.
+
+        Parameters
+        ----------
+        samples : Samples
+            Checked: finite, of the model's dimensions.
+
+        Raises
+        ------
+        DataError
+            An action is so long that hardly any other is motion beside it.
+        """
+        self.include(self.sums(samples, self.deal(samples)))
+
+    def deal(self, samples: Samples) -> np.ndarray | None:
+        """The fold of each sample, (N,); new episodes are dealt out. None where λ is a number.
+
+        Parameters
+        ----------
+        samples : Samples
+
+        Returns
+        -------
+        array (N,) of int or None
+        """
+        return None if self.folds is None else self.folds.assign(samples.groups, len(samples.states))
+
+    def sums(self, samples: Samples, fold: np.ndarray | None = None) -> Sums:
+        """What samples add. Changes nothing, so threads may call it side by side.
+
+        Parameters
+        ----------
+        samples : Samples
+        fold : array (N,) of int, optional
+            From `deal`.
+
+        Returns
+        -------
+        Sums
+
+        Raises
+        ------
+        DataError
+            An action is so long that hardly any other is motion beside it.
+        """
+        U = samples.actions
+        r = lengths(U)
+        longest = max(float(r.max(initial=0.0)), self.longest)
+        moves = r > NO_MOTION * longest
+        _check_outlier(r, moves)
+        counted = self.counted(samples, moves)
+        observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
+        moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
+        for k in [0] if fold is None else np.unique(fold[counted]).tolist():
+            rows = counted if fold is None else counted & (fold == k)
+            if rows.any():
+                moments[k] = self._moments(samples, observation, rows)
+        return Sums(
+            tuple(moments),
+            n_samples=len(U),
+            n_zero=len(U) - int(np.count_nonzero(moves)),
+            n_known=0 if samples.projections is None else int(np.sum(~unknown(samples.projections))),
+            longest=longest,
+            shortest=float(r.min(initial=math.inf, where=moves)),
+        )
+
+    def include(self, sums: Sums) -> None:
+        """Add sums to those there are.
+
+        Parameters
+        ----------
+        sums : Sums
+        """
+        self.total = self.total + sums
+
+    def merge(self, other: "Accumulator") -> None:
+        """Add what another accumulator of the same model has summed of the samples that follow these.
+
+        Parameters
+        ----------
+        other : Accumulator
+            Episodes that it dealt out by itself are counted on from those dealt out here.
+        """
+        sums = other.total
+        if self.folds is not None and other.folds is not None and other.folds.n_dealt:
+            sums = sums.rotated(self.folds.n_dealt % self.folds.n_folds, self.folds.n_folds)
+            self.folds.deal_unnamed(other.folds.n_dealt)
+        self.include(sums)
+
+    def empty(self, known_folds: dict | None = None, longest: float | None = None) -> "Accumulator":
+        """An accumulator of the same model and options to which nothing was added.
+
+        Parameters
+        ----------
+        known_folds : dict, optional
+            Folds of the episodes that it will see, where they were dealt out before.
+        longest : float, optional
+            Length of the longest action known; by default what is known here.
+
+        Returns
+        -------
+        Accumulator
+        """
+        folds = None if self.folds is None else EpisodeFolds(self.folds.n_folds, known_folds)
+        return Accumulator(
+            self.model, self.risk, self.alpha, self.longest if longest is None else longest, folds
+        )
+
+    def copy(self) -> "Accumulator":
+        """An independent accumulator with the same sums, which never change themselves.
+
+        Returns
+        -------
+        Accumulator
+        """
+        folds = None if self.folds is None else self.folds.copy()
+        other = Accumulator(self.model, self.risk, self.alpha, self.longest, folds)
+        other.total = self.total
+        return other
+
+    def without_labels(self) -> "Accumulator":
+        """The same sums and number of episodes, without the episodes' labels: what needs to travel.
+
+        Returns
+        -------
+        Accumulator
+        """
+        other = self.copy()
+        if other.folds is not None:
+            other.folds.fold_of.clear()
+        return other
+
+    def counted(self, samples: Samples, moves: np.ndarray) -> np.ndarray:
+        """Which samples say something of the policy.
+
+        Parameters
+        ----------
+        samples : Samples
+        moves : array (N,) of bool
+            Which of them move.
+
+        Returns
+        -------
+        array (N,) of bool
+        """
+        if self.risk == "direct":
+            says = np.ones_like(moves)
+        else:
+            says = moves if samples.projections is None else moves | informative(samples.projections)
+        return says if samples.weights is None else says & (samples.weights > 0)
+
+    def moments(self, without: int | None = None) -> Moments:
+        """The sum over all folds, or all but one.
+
+        Parameters
+        ----------
+        without : int, optional
+            The fold left out.
+
+        Returns
+        -------
+        Moments
+
+        Raises
+        ------
+        DataError
+            There is none.
+        """
+        return Moments.sum(self._folds(without))
+
+    def solve(self, alpha: float | str | None = None, without: int | None = None) -> Solution:
+        """Solve for the parameters.
+
+        Parameters
+        ----------
+        alpha : float or "cv", optional
+            λ, or "cv" where the sums were kept by fold. By default as at the beginning.
+        without : int, optional
+            A fold to leave out; λ is then chosen among the others. It costs no pass over the data.
+
+        Returns
+        -------
+        Solution
+
+        Raises
+        ------
+        DataError
+            There is nothing to learn from, or too few folds to choose λ.
+        """
+        alpha = self.alpha if alpha is None else alpha
+        folds = self._folds(without)
+        total = Moments.sum(folds)
+        if alpha != "cv":
+            return self._solution(total.solve(float(alpha)), float(alpha))
+        spectrum = total.decompose()
+        chosen, alphas, risk = choose_alpha(folds, float(spectrum.values.max()))
+        return self._solution(spectrum.solve([chosen])[..., 0, :], chosen, alphas, risk)
+
+    def _solution(
+        self,
+        w: np.ndarray,
+        alpha: float,
+        alphas: np.ndarray | None = None,
+        held_out_risk: np.ndarray | None = None,
+    ) -> Solution:
+        total = self.total
+        counts = (total.n_samples, total.n_zero, total.n_known)
+        return Solution(self.model.parameters(w), alpha, alphas, held_out_risk, *counts)
+
+    def _folds(self, without: int | None) -> list[Moments]:
+        folds = [part for k, part in enumerate(self.total.moments) if part is not None and k != without]
+        if folds:
+            return folds
+        if without is None:
+            raise DataError(NO_DIRECTION)
+        raise DataError(
+            "all motion lies in one fold, so none is left without it: give more episodes, or no groups"
+        )
+
+    def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Moments:
+        X, weights = samples.states, samples.weights
+        if rows.all():
+            return self.model.moments(X, observation, weights)
+        index = np.flatnonzero(rows)
+        # Stored a row a dimension, along which sums run.
+        taken = None if weights is None else weights[index]
+        return self.model.moments(X.T.take(index, axis=1).T, observation[index], taken)
+
+
+def _check_outlier(r: np.ndarray, moves: np.ndarray) -> None:
+    """Refuse a batch in which one action is so long that nothing else is motion."""
+    nonzero, moving = np.count_nonzero(r), np.count_nonzero(moves)
+    if moving == 0 or nonzero - moving < 3 or moving > max(LEAST_MOVING, LEAST_MOVING_SHARE * nonzero):
+        return
+    typical = float(np.median(r[(r > 0) & ~moves]))
+    raise DataError(
+        f"the action in row {int(np.argmax(r))} is {r.max():.3g} long where the others are about {typical:.3g}, so "
+        "beside it none of them moves: correct it, or leave it out"
+    )

@@ -1,0 +1,86 @@
+"""Sums over samples, in blocks that stay in the processor's cache and are shared out over threads."""
+
+import threading
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from unconstrain.parallel import blocks, shared_out
+
+SAMPLES_IN_PIECE = 384
+"""Block lengths are multiples of this; narrow products are taken in pieces of it (see `parametric`)."""
+
+Totals = list[np.ndarray]
+
+_spaces = threading.local()
+
+
+def sum_over_blocks(
+    n_samples: int, rows: int, shapes: Sequence[tuple[int, ...]], add: Callable[[slice, Totals], None]
+) -> Totals:
+    """Add up all blocks of samples.
+
+    Parameters
+    ----------
+    n_samples : int
+    rows : int
+        Samples in a block.
+    shapes : sequence of shapes
+        Of the totals.
+    add : callable
+        Adds the block, a slice of samples, to the totals in place.
+
+    Returns
+    -------
+    list of array
+        The totals.
+    """
+
+    def share(of_blocks: Sequence[slice]) -> Totals:
+        totals = [np.zeros(shape) for shape in shapes]
+        for block in of_blocks:
+            add(block, totals)
+        return totals
+
+    first, *others = shared_out(share, blocks(n_samples, rows))
+    return [np.asarray(sum(parts[1:], start=parts[0])) for parts in zip(first, *others, strict=True)]
+
+
+def rows_in_block(numbers: int, width: int) -> int:
+    """How many samples a block holds: few enough for the cache, enough to be worth a call.
+
+    Parameters
+    ----------
+    numbers : int
+        Numbers in the block.
+    width : int
+        Numbers a sample takes in it.
+
+    Returns
+    -------
+    int
+    """
+    size = max(256, min(numbers // width, 11 * SAMPLES_IN_PIECE))
+    return size - size % SAMPLES_IN_PIECE if size > SAMPLES_IN_PIECE else size
+
+
+def working_space(name: str, *shape: int) -> np.ndarray:
+    """This thread's own working space, its contents those of the block before.
+
+    Memory new for every block would have to be mapped and cleared each time, which costs a fifth of the whole.
+
+    Parameters
+    ----------
+    name : str
+        What it is used for.
+    *shape : int
+
+    Returns
+    -------
+    array
+    """
+    held: np.ndarray | None = getattr(_spaces, name, None)
+    if held is None or held.shape != shape:
+        held = np.empty(shape)
+        setattr(_spaces, name, held)
+    return held

@@ -1,0 +1,84 @@
+"""What samples add to a fit: moments by fold, and counts."""
+
+import math
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+
+from unconstrain.fitting.moments import Moments
+from unconstrain.motion import NO_MOTION
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Moments by fold, and the counts that a fit reports. Sums add, in any order and grouping.
+
+    Whether an action moves depends on the longest action of all. A sample left out stays out whatever is to come; a
+    sample counted earlier may turn out to have no motion, and `misjudged` records that.
+
+    Parameters
+    ----------
+    moments : tuple of Moments or None
+        By fold; None where a fold has no samples.
+    n_samples : int
+        Samples added, including those without motion.
+    n_zero : int
+        Samples that do not move.
+    n_known : int
+        Samples whose projection is known.
+    longest : float
+        Length of the longest action, in its unit.
+    shortest : float
+        Length of the shortest action that was counted as motion.
+    """
+
+    moments: tuple[Moments | None, ...] = ()
+    n_samples: int = 0
+    n_zero: int = 0
+    n_known: int = 0
+    longest: float = 0.0
+    shortest: float = math.inf
+
+    def __add__(self, other: "Sums") -> "Sums":
+        return Sums(
+            tuple(
+                a if b is None else b if a is None else a + b
+                for a, b in zip_longest(self.moments, other.moments)
+            ),
+            self.n_samples + other.n_samples,
+            self.n_zero + other.n_zero,
+            self.n_known + other.n_known,
+            max(self.longest, other.longest),
+            min(self.shortest, other.shortest),
+        )
+
+    def rotated(self, by: int, n_folds: int) -> "Sums":
+        """The same sums, with fold k renamed to fold (k + by) mod n_folds.
+
+        Parameters
+        ----------
+        by : int
+        n_folds : int
+
+        Returns
+        -------
+        Sums
+        """
+        moments: list[Moments | None] = [None] * n_folds
+        for fold, part in enumerate(self.moments):
+            moments[(fold + by) % n_folds] = part
+        return replace(self, moments=tuple(moments))
+
+    @property
+    def present(self) -> list[Moments]:
+        """The moments of the folds that have samples."""
+        return [part for part in self.moments if part is not None]
+
+    @property
+    def n_counted(self) -> int:
+        """How many samples the moments hold."""
+        return sum(part.n_samples for part in self.present)
+
+    @property
+    def misjudged(self) -> bool:
+        """Whether a sample was counted as motion that has none beside the longest action."""
+        return self.shortest <= NO_MOTION * self.longest

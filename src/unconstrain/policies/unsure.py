@@ -1,0 +1,51 @@
+"""Where a policy is not known well enough to follow it."""
+
+import numpy as np
+
+from unconstrain.arrays import check_number
+from unconstrain.policies.base import Policy
+
+
+class Unsure:
+    """A criterion for `rollout(..., stop_when=Unsure(policy, 0.5))`.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    share : float
+        The share of the predicted speed that the standard deviation (the root of the summed variances of all actions)
+        may not exceed.
+
+    Raises
+    ------
+    PolicyError
+        The share is not positive, or the policy was saved without its sums.
+    """
+
+    def __init__(self, policy: Policy, share: float):
+        self.policy = policy
+        self.share = check_number(share, "the share of the speed", positive=True)
+        self.posterior = policy.posterior()
+
+    def __call__(self, X: np.ndarray) -> np.ndarray:
+        """Say at which states X (N, n) the policy is not known well enough, (N,)."""
+        deviation, speed = self.measure(X)
+        return deviation > self.share * speed
+
+    def measure(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviation and predicted speed.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+
+        Returns
+        -------
+        deviation, speed : array (N,)
+            In units of the action.
+        """
+        P = np.reshape(self.policy.predict(X), (len(X), -1))
+        variance = np.einsum("njj->n", self.policy.covariance(X, self.posterior))
+        return np.sqrt(np.maximum(variance, 0.0)), np.linalg.norm(P, axis=1)

@@ -1,0 +1,28 @@
+"""Samples on their way into a fit: plain arrays, of any precision, not checked again."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Samples(NamedTuple):
+    """States, actions, and what else is known of them.
+
+    Parameters
+    ----------
+    states : array (N, n)
+    actions : array (N, d)
+    groups : array (N,), optional
+        Episode labels.
+    projections : array (N, d, d), optional
+        The nullspace projections, all NaN where one is not known.
+    weights : array (N,), optional
+        Each multiplies the squared error of its sample.
+    """
+
+    states: NDArray[Any]
+    actions: NDArray[Any]
+    groups: NDArray[Any] | None = None
+    projections: NDArray[np.float64] | None = None
+    weights: NDArray[np.float64] | None = None

@@ -236,7 +236,7 @@ def select_policy(
         groups = demos.episodes if groups is None and demos.n_episodes > 1 else groups
         projections = demos.projections if projections is None else projections
         X, U = demos.states, demos.actions
-    X, _ = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
+    X, U = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
     named = _named(candidates, X.shape[1], actions.shape[1])
     if projections is not None:

@@ -5,18 +5,18 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 import unconstrain as uc
-from unconstrain.parallel import blocks, shared_out
+from unconstrain.parallel import cut_blocks, map_shares
 
 
 def test_blocks_cover_every_sample_once():
-    assert [list(range(10))[block] for block in blocks(10, 4)] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
-    assert blocks(0, 4) == []
+    assert [list(range(10))[block] for block in cut_blocks(10, 4)] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
+    assert cut_blocks(0, 4) == []
 
 
 def test_every_piece_is_worked_on_once_whatever_the_threads():
     for threads in (1, 2, 4):
         with threadpool_limits(threads):
-            shares = shared_out(list, list(range(11)))
+            shares = map_shares(list, list(range(11)))
         assert sorted(piece for share in shares for piece in share) == list(range(11))
 
 
@@ -25,7 +25,7 @@ def test_what_goes_wrong_in_a_thread_reaches_the_caller():
         raise ValueError("broken piece")
 
     with pytest.raises(ValueError, match="broken piece"):
-        shared_out(fail, [1, 2, 3])
+        map_shares(fail, [1, 2, 3])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import numpy as np
 
 from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.motion import directions
-from unconstrain.parallel import blocks
+from unconstrain.parallel import cut_blocks
 from unconstrain.receptive import normalized_activations
 
 NUMBERS_IN_BLOCK = 2**22
@@ -37,7 +37,7 @@ def coverage(X: np.ndarray, seen_at: np.ndarray, actions: np.ndarray, width: flo
     i, j = pairs(d)
     products = distinct_products(unit).T
     second = np.empty((len(X), d, d))
-    for rows in blocks(len(X), max(1, NUMBERS_IN_BLOCK // len(seen_at))):
+    for rows in cut_blocks(len(X), max(1, NUMBERS_IN_BLOCK // len(seen_at))):
         near = normalized_activations(X[rows], seen_at, width) @ products
         second[rows, i, j] = second[rows, j, i] = near
     values, vectors = np.linalg.eigh(second)

@@ -14,7 +14,7 @@ from unconstrain.diagnostics.information import Information, stacked
 from unconstrain.diagnostics.spectrum import directions, shares_seen
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
-from unconstrain.parallel import blocks
+from unconstrain.parallel import cut_blocks
 from unconstrain.policies.base import Policy
 
 NUMBERS_IN_BLOCK = 2**20
@@ -83,7 +83,7 @@ def leverages(
     roots = [one.vectors / np.sqrt(one.seen + threshold) for one in directions(information)]  # A = R Rᵀ
     result = np.zeros(len(X))
     width = max(root.shape[1] for root in roots) + information.moments.H.shape[-1]
-    for rows in blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
+    for rows in cut_blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
         looked, reached = observation[rows].rows, policy.model_.reach(X[rows])
         for k in range(observation.n_rows):
             V = policy.model_.along(X[rows], looked[:, k])

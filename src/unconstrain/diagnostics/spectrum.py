@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unconstrain.diagnostics.information import Information
-from unconstrain.parallel import shared_out
+from unconstrain.parallel import map_shares
 
 RELATIVE_CUTOFF = 1e-10
 
@@ -62,5 +62,5 @@ def _of_every_model(information: Information, solve) -> list:
     def share(models: Sequence[int]) -> list:
         return [(m, one(information.moments.H[m], information.whole[m])) for m in models]
 
-    found = [pair for part in shared_out(share, range(len(information))) for pair in part]
+    found = [pair for part in map_shares(share, range(len(information))) for pair in part]
     return [result for _, result in sorted(found, key=lambda pair: pair[0])]

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.parallel import blocks, shared_out
+from unconstrain.parallel import cut_blocks, map_shares
 from unconstrain.storage import Kind, load_object, save_object
 
 # λ relative to the mean eigenvalue of H. What rounding leaves of g where H is silent is then divided by enough to stay
@@ -186,7 +186,7 @@ class Moments:
                 for m in models:
                     values[m], vectors[m] = np.linalg.eigh(stack[m])
 
-            shared_out(decompose, blocks(len(stack), 8))
+            map_shares(decompose, cut_blocks(len(stack), 8))
             values, vectors = values.reshape(self.H.shape[:-1]), vectors.reshape(self.H.shape)
         return Spectrum(values, vectors, vectors.swapaxes(-1, -2) @ self.g)
 

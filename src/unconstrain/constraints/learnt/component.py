@@ -19,7 +19,7 @@ class NullspaceComponent(BaseEstimator):
 
     Parameters
     ----------
-    features : transformer or policy features, optional
+    features : transformer or feature map, optional
         Of ũ, as for `ParametricPolicy`; ``(x, 1)`` by default.
     alpha : float
         Weight decay λ of ``E(w) + λ‖w‖²``.
@@ -28,7 +28,7 @@ class NullspaceComponent(BaseEstimator):
     ----------
     weights_ : ndarray of shape (P,)
         Parameters of ũ.
-    features_ : policy features
+    features_ : feature map
         As fitted.
     cost_ : float
         Mean of E over the samples, in squared units of the action.

@@ -50,10 +50,10 @@ class FeatureConstraint(LearntConstraint):
 
     Parameters
     ----------
-    features : callable, transformer or policy features, optional
+    features : callable, transformer or feature map, optional
         What the rows are combined from. A function that returns a task Jacobian J (N, m, d) at states X (N, n): then
         Λ (k, m) says which task coordinates are constrained. A scikit-learn transformer b, by default
-        ``b(x) = (x, 1)``: then ``Φ(x) = b(x) ⊗ I``, any direction that varies as b does. Or policy features:
+        ``b(x) = (x, 1)``: then ``Φ(x) = b(x) ⊗ I``, any direction that varies as b does. Or a feature map:
         `PotentialFeatures(PolynomialFeatures(2))`, say, makes the row a gradient: the constraint is a quadric surface.
     n_constraints : int, optional
         Number k of rows. None reads it off the shares of motion, as `ConstantConstraint` does, which needs actions
@@ -65,7 +65,7 @@ class FeatureConstraint(LearntConstraint):
     ----------
     weights_ : ndarray of shape (k, P)
         The rows' parameters.
-    features_ : policy features
+    features_ : feature map
         As fitted.
     n_constraints_ : int
         Number k of rows.
@@ -300,7 +300,7 @@ def _normalize(rows: np.ndarray) -> np.ndarray:
 
 
 def _as_row_features(given: object) -> Features:
-    """Make features of rows: a function is a Jacobian; anything that can be fitted is as for a policy."""
+    """Make a feature map of rows: a function is a Jacobian; anything that can be fitted is as for a policy."""
     if callable(given) and not hasattr(given, "fit"):
         return JacobianFeatures(given)
     return as_features(given)

@@ -17,20 +17,13 @@ class JacobianFeatures(BaseEstimator):
     ----------
     jacobian : callable
         Function of states X (N, n) that returns J (N, m, d), such as a robot's Jacobian of the hand.
-
-    Attributes
-    ----------
-    n_parameters_ : int
-        Number m of task coordinates.
     """
-
-    n_parameters_: int
 
     def __init__(self, jacobian: Callable[[np.ndarray], ArrayLike]):
         self.jacobian = jacobian
 
     def fit(self, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> Self:
-        """Learn the number of task coordinates.
+        """Check that the Jacobian fits the states and actions.
 
         Parameters
         ----------

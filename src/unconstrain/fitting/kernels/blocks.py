@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from unconstrain.parallel import blocks, shared_out
+from unconstrain.parallel import cut_blocks, map_shares
 
 SAMPLES_IN_PIECE = 384
 """Block lengths are multiples of this; narrow products are taken in pieces of it (see `parametric`)."""
@@ -42,7 +42,7 @@ def sum_over_blocks(
             add(block, totals)
         return totals
 
-    first, *others = shared_out(share, blocks(n_samples, rows))
+    first, *others = map_shares(share, cut_blocks(n_samples, rows))
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in zip(first, *others, strict=True)]
 
 

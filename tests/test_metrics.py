@@ -9,7 +9,7 @@ import unconstrain as uc
 from tests.problems import problems
 from unconstrain import metrics as risk
 from unconstrain.fitting.observation import RISKS, observe
-from unconstrain.motion import directions, lengths, moving
+from unconstrain.motion import moving
 
 
 @given(problems(), st.floats(-3, 3))
@@ -102,14 +102,6 @@ def test_the_share_explained_does_not_depend_on_the_unit(scale):
     assert uc.metrics.explained(scale * U, scale * U) == pytest.approx(1.0)
 
 
-def test_lengths_are_right_where_squares_are_not():
-    U = np.array([[3e200, 4e200], [3e-200, 4e-200], [3.0, 4.0], [0.0, 0.0]])
-    np.testing.assert_allclose(lengths(U), [5e200, 5e-200, 5.0, 0.0], rtol=1e-12)
-    np.testing.assert_allclose(lengths(U[1:2]), [5e-200], rtol=1e-12)
-    assert moving(np.array([[1.0], [1e300]])).tolist() == [False, True]
-    np.testing.assert_allclose(directions(1e-320 * np.ones((1, 1)))[0], [[1.0]])
-
-
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
@@ -124,6 +116,7 @@ def test_lengths_are_right_where_squares_are_not():
         ),
         (lambda: risk.normalized(1.0, 1e-200 * np.eye(2)), "true policy's actions reach 1e-200"),
         (lambda: risk.inconsistency(np.empty((0, 2)), np.empty((0, 2))), "no samples"),
+        (lambda: risk.direct(np.ones((9, 2)), np.ones((2, 9))), r"same shape: did you mean the transpose\?"),
     ],
 )
 def test_what_cannot_be_measured_is_told(call, sentence):

@@ -294,7 +294,8 @@ def _check_pair(A: ArrayLike, B: ArrayLike, name_a: str, name_b: str) -> tuple[n
 def _check_shapes(A: ArrayLike, B: ArrayLike, name_a: str, name_b: str) -> tuple[np.ndarray, np.ndarray]:
     A, B = check_actions(A, name_a), check_actions(B, name_b)
     if A.shape != B.shape:
-        raise DataError(f"{name_a} {A.shape} and {name_b} {B.shape} must have the same shape")
+        hint = ": did you mean the transpose?" if A.shape == B.shape[::-1] else ""
+        raise DataError(f"{name_a} {A.shape} and {name_b} {B.shape} must have the same shape{hint}")
     if not len(A):
         raise DataError("no samples: a mean error needs at least one")
     return A, B

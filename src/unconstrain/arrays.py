@@ -103,7 +103,7 @@ def check_squarable(names: str, *arrays: np.ndarray) -> None:
     DataError
         If the square of the largest would be infinite, or zero though the number is not.
     """
-    largest = max(float(np.abs(array).max(initial=0.0)) for array in arrays)
+    largest = max(_largest(array) for array in arrays)
     if largest and not 1 / SQUARABLE <= largest <= SQUARABLE:
         raise DataError(
             f"{names} reach {largest:.3g}, whose square double precision does not hold: give them in another unit"
@@ -408,8 +408,13 @@ def check_choice(value: object, name: str, choices: tuple[str, ...]) -> str:
 
 def _check_not_too_large(names: str, array: np.ndarray) -> None:
     # States close to zero are no mistake: nothing is learnt from how long a state is.
-    if np.abs(array).max(initial=0.0) > SQUARABLE:
+    if _largest(array) > SQUARABLE:
         check_squarable(names, array)
+
+
+def _largest(array: np.ndarray) -> float:
+    # Without the copy that the absolute values would be.
+    return max(float(array.max(initial=0.0)), -float(array.min(initial=0.0)))
 
 
 def _hint_at_samples(X: ArrayLike, y: ArrayLike) -> str:

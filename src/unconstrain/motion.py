@@ -90,5 +90,9 @@ def directions(U: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         `‖u‖`, zero where an action does not move.
     """
     r = lengths(U)
-    r[r <= NO_MOTION * r.max(initial=0.0)] = 0.0
-    return np.divide(U, r[:, None], out=np.zeros(U.shape), where=r[:, None] > 0), r
+    longest = r.max(initial=0.0)
+    r[r <= NO_MOTION * longest] = 0.0
+    if 0.0 < longest < 1 / SQUARABLE:  # whose inverse may be infinite
+        return directions(U / longest)[0], r
+    inverse = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0)
+    return U * inverse[:, None], r

@@ -20,7 +20,7 @@ def _data(n_samples: int, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
 def local_fit() -> Ratio:
     """M = 50 local models on 10,000 samples in 7 dimensions."""
     X, U = _data(10_000, 7)
-    policy = uc.LocallyLinearPolicy(centers=X[:50].copy(), width=3**0.5)
+    policy = uc.LocallyLinearPolicy(centers=X[:50].copy(), width=3**0.5, alpha=1e-6)
     reference = yardsticks.dgemm(50, 10_000, 36 * 28)
     ours, blas = medians(lambda: policy.fit(X, U), reference, repeats=15)
     return Ratio(
@@ -31,7 +31,7 @@ def local_fit() -> Ratio:
 def parametric_fit() -> Ratio:
     """100 RBFs on 200,000 samples in 7 dimensions, their evaluation included."""
     X, U = _data(200_000, 7)
-    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:100].copy(), width=2.0))
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:100].copy(), width=2.0), alpha=1e-6)
     reference = yardsticks.dsyrk_in_blocks(700, 200_000)
     ours, blas = medians(lambda: policy.fit(X, U), reference, repeats=3)
     return Ratio(
@@ -42,7 +42,7 @@ def parametric_fit() -> Ratio:
 def wide_fit() -> Ratio:
     """The linear policy on 200,000 samples in 27 dimensions."""
     X, U = _data(200_000, 27)
-    policy = uc.ParametricPolicy()
+    policy = uc.ParametricPolicy(alpha=1e-6)
     reference = yardsticks.dsyrk_in_blocks(756, 200_000)
     ours, blas = medians(lambda: policy.fit(X, U), reference, repeats=3)
     return Ratio(
@@ -85,7 +85,7 @@ def loop() -> Ratio:
     X, U = _data(10_000, 7)
     centers, width = X[:50].copy(), 3**0.5
     part = len(X) // 20
-    policy = uc.LocallyLinearPolicy(centers=centers, width=width)
+    policy = uc.LocallyLinearPolicy(centers=centers, width=width, alpha=1e-6)
     w = yardsticks.published_local_fit(X[:part], U[:part], centers[:2], width, policy.alpha)
     policy.fit(X[:part], U[:part])
     ours_w = np.concatenate([policy.coef_, policy.intercept_[:, :, None]], axis=2)[:2].reshape(2, -1)
@@ -110,7 +110,7 @@ def loop() -> Ratio:
 def growth() -> Ratio:
     """Parametric-fit on ten times the data."""
     X, U = _data(200_000, 7)
-    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:100].copy(), width=2.0))
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:100].copy(), width=2.0), alpha=1e-6)
     part = len(X) // 10
     whole, tenth = medians(lambda: policy.fit(X, U), lambda: policy.fit(X[:part], U[:part]), repeats=3)
     return Ratio(

@@ -270,3 +270,53 @@ def test_mistakes_are_told_in_one_sentence(call, sentence):
     with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def snapshot(policy):
+    return {name: value for name, value in vars(policy).items()}, policy.predict(X)
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        lambda policy: policy.fit(X, 0 * U),
+        lambda policy: policy.fit(X[:, :1], U, groups=[1, 1, 1, 1]),
+        lambda policy: policy.set_params(centers=np.ones((2, 5))).fit(2 * X, U),
+        lambda policy: policy.partial_fit(X, U[:, :1]),
+        lambda policy: policy.partial_fit(X, np.full_like(U, np.nan)),
+        lambda policy: policy.partial_fit(X, [[1e13, 0.0]] * 4, groups=[9] * 4),
+    ],
+)
+def test_a_fit_that_fails_leaves_the_policy_as_it_was(mistake):
+    policy = uc.LocallyLinearPolicy(n_centers=2).fit(X, U, groups=[0, 0, 1, 1])
+    before, predicted = snapshot(policy)
+    with pytest.raises(uc.errors.UnconstrainError):
+        mistake(policy)
+    after, still = snapshot(policy)
+    assert {name for name in before if before[name] is not after[name]} <= {"centers"}
+    assert before.keys() == after.keys()
+    np.testing.assert_array_equal(still, predicted)
+
+
+def test_one_action_beside_which_nothing_else_moves_is_named():
+    rng = np.random.default_rng(0)
+    states, actions = rng.normal(size=(2, 50, 2))
+    actions[17] *= 1e14
+    with pytest.raises(uc.errors.DataError, match=r"action in row 17 is .* long where the others"):
+        uc.ParametricPolicy().fit(states, actions)
+    with pytest.raises(uc.errors.DataError, match=r"the actions y reach .*: give them in another unit"):
+        uc.ParametricPolicy().fit(states, 1e200 * actions)
+    policy = uc.ParametricPolicy().fit(states[:17], actions[:17])
+    with pytest.raises(uc.errors.DataError, match="leave it out"):
+        policy.partial_fit(states[17:18], actions[17:18])
+    policy.partial_fit(states[18:], actions[18:])
+    assert policy.n_zero_actions_ == 0
+
+
+def test_actions_in_any_unit_that_can_be_squared_are_learnt_from():
+    states = np.random.default_rng(0).normal(size=(50, 2))
+    for unit in (1e-140, 1.0, 1e140):
+        policy = uc.ParametricPolicy().fit(states, -unit * states)
+        np.testing.assert_allclose(policy.predict(states), -unit * states, rtol=1e-6)
+    with pytest.raises(uc.errors.DataError, match="give them in another unit"):
+        uc.ParametricPolicy().fit(states, -1e-200 * states)

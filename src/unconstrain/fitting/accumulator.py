@@ -141,7 +141,7 @@ class Accumulator:
         longest = max(float(r.max(initial=0.0)), self.longest)
         moves = r > NO_MOTION * longest
         _check_outlier(r, moves)
-        counted = self.counted(samples, moves)
+        counted = informative_samples(self.risk, samples, moves)
         observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
         for k in [0] if fold is None else np.unique(fold[counted]).tolist():
@@ -223,25 +223,6 @@ class Accumulator:
             other.folds.fold_of.clear()
         return other
 
-    def counted(self, samples: Samples, moves: np.ndarray) -> np.ndarray:
-        """Which samples say something of the policy.
-
-        Parameters
-        ----------
-        samples : Samples
-        moves : array (N,) of bool
-            Which of them move.
-
-        Returns
-        -------
-        array (N,) of bool
-        """
-        if self.risk == "direct":
-            says = np.ones_like(moves)
-        else:
-            says = moves if samples.projections is None else moves | informative(samples.projections)
-        return says if samples.weights is None else says & (samples.weights > 0)
-
     def moments(self, without: int | None = None) -> Moments:
         """The sum over all folds, or all but one.
 
@@ -318,6 +299,30 @@ class Accumulator:
         # Stored a row a dimension, along which sums run.
         taken = None if weights is None else weights[index]
         return self.model.moments(X.T.take(index, axis=1).T, observation[index], taken)
+
+
+def informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> np.ndarray:
+    """Tell which samples say something of the policy.
+
+    Parameters
+    ----------
+    risk : {"inconsistency", "direct"}
+        Under the first, a sample that does not move says something only where its projection is known and not zero.
+    samples : Samples
+        N samples.
+    moves : array (N,) of bool
+        Which of them move.
+
+    Returns
+    -------
+    array (N,) of bool
+        True for those that count.
+    """
+    if risk == "direct":
+        says = np.ones_like(moves)
+    else:
+        says = moves if samples.projections is None else moves | informative(samples.projections)
+    return says if samples.weights is None else says & (samples.weights > 0)
 
 
 def _check_outlier(r: np.ndarray, moves: np.ndarray) -> None:

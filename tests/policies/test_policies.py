@@ -273,7 +273,7 @@ def test_mistakes_are_told_in_one_sentence(call, sentence):
 
 
 def snapshot(policy):
-    return {name: value for name, value in vars(policy).items()}, policy.predict(X)
+    return dict(vars(policy)), policy.predict(X)
 
 
 @pytest.mark.parametrize(

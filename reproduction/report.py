@@ -1,18 +1,17 @@
-"""Every experiment on one page: Markdown, and HTML with its pictures inside."""
+"""Every experiment on one page of Markdown, with its pictures."""
 
-import base64
 import os
 import platform
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from urllib.parse import quote
 
-from markdown_it import MarkdownIt
 from rich.console import Console
 
-from reproduction import EXPERIMENTS, experiment
-from reproduction.outcome import Outcome
-from unconstrain import atomic
+from reproduction.experiments import EXPERIMENTS, RECORDED, find_experiment
+from reproduction.outcome import Outcome, make_folder, write_text
+from reproduction.recordings import check_surfaces
 from unconstrain.errors import UnconstrainError
 
 INTRODUCTION = """\
@@ -23,59 +22,78 @@ Constrained Motion*, ICRA 2009, and those that go beyond it. Published figures s
 `{command}`; trial k of an experiment has the seed k.
 """
 
-STYLE = """\
-body { max-width: 60rem; margin: 2rem auto; padding: 0 1rem; font: 16px/1.5 system-ui, sans-serif; color: #222 }
-table { border-collapse: collapse; margin: 1rem 0; font-size: 14px } img { max-width: 100% }
-th, td { border-bottom: 1px solid #ddd; padding: .25rem .75rem; text-align: right } th:first-child, td:first-child
-{ text-align: left } code { background: #f4f4f4 } figure { margin: 1rem 0 } figcaption { color: #555 }
-"""
-
 PACKAGES = ("unconstrain", "numpy", "scipy", "scikit-learn", "mujoco", "mink")
+"""Whose versions the page names."""
 
 
-def reproduce_all(out: Path, *, trials: int | None, jobs: int, console: Console) -> list[Outcome]:
-    """Run all experiments into folders of `out`, then write `report.md` and `report.html` there.
+def reproduce_all(
+    out: Path, *, trials: int | None, jobs: int, console: Console, recordings: Path | None = None
+) -> Path:
+    """Run all experiments into folders of `out`, and write a page about them.
 
-    An experiment that cannot run here (an extra is not installed) is left out, and the page says so.
+    An experiment that cannot run here, because an extra is not installed, is left out, and the page says so.
+
+    Parameters
+    ----------
+    out : Path
+        The folder to write into. Finished trials are kept there.
+    trials : int, optional
+        Data sets of each experiment; by default as many as published.
+    jobs : int
+        Processes.
+    console : Console
+        Where progress is shown.
+    recordings : Path, optional
+        The folder of the recorded surfaces.
+
+    Returns
+    -------
+    Path
+        Of `report.md`.
     """
+    check_surfaces(recordings)
+    make_folder(out)
     outcomes, missing = [], {}
     for name in EXPERIMENTS:
         console.rule(name)
+        options = {"recordings": recordings} if name in RECORDED else {}
         try:
-            outcomes.append(experiment(name).reproduce(out / name, trials=trials, jobs=jobs, console=console))
+            outcomes.append(
+                find_experiment(name)(out / name, trials=trials, jobs=jobs, console=console, **options)
+            )
         except UnconstrainError as error:
             console.print(f"{name} is left out: {error}")
             missing[name] = str(error)
-    command = "unconstrain reproduce all" + ("" if trials is None else f" --trials {trials}")
-    write(outcomes, missing, out, command)
-    return outcomes
+    command = "python -m reproduction all"
+    command += "" if recordings is None else " --recordings FOLDER"
+    command += "" if trials is None else f" --trials {trials}"
+    return write_report(outcomes, missing, out, command)
 
 
-def write(outcomes: list[Outcome], missing: dict[str, str], out: Path, command: str) -> None:
-    """Write `report.md`, whose pictures are links, and `report.html`, which stands alone, into the folder `out`."""
-    page = "\n".join(
-        [
-            INTRODUCTION.format(command=command),
-            *(_section(outcome, out) for outcome in outcomes),
-            *(f"## {name}\n\nLeft out: {reason}\n" for name, reason in missing.items()),
-            _versions(),
-        ]
-    )
-    body = MarkdownIt("commonmark").enable("table").render(page)
-    for outcome in outcomes:
-        for picture in outcome.figures:
-            data = base64.b64encode(picture.read_bytes()).decode()
-            body = body.replace(f'src="{_link(picture, out)}"', f'src="data:image/png;base64,{data}"')
-    html = (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>unconstrain: the paper, reproduced</title>\
-<meta name="viewport" content="width=device-width"><style>{STYLE}</style><body>{body}</body></html>\n'
-    )
-    for name, text in (("report.md", page), ("report.html", html)):
-        with atomic.replacing(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+def write_report(outcomes: Sequence[Outcome], missing: Mapping[str, str], out: Path, command: str) -> Path:
+    """Write `report.md`, whose pictures are links, into the folder `out`, and return its path.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        In the order of the page.
+    missing : mapping of str to str
+        Why an experiment is left out, by its name.
+    out : Path
+        The folder.
+    command : str
+        That made the page.
+    """
+    page = [
+        INTRODUCTION.format(command=command),
+        *(_write_section(outcome, out) for outcome in outcomes),
+        *(f"## {name}\n\nLeft out: {reason}\n" for name, reason in missing.items()),
+        _list_versions(),
+    ]
+    return write_text(out / "report.md", "\n".join(page))
 
 
-def _section(outcome: Outcome, out: Path) -> str:
+def _write_section(outcome: Outcome, out: Path) -> str:
     parts = [f"## {outcome.title}\n", outcome.table.strip() + "\n"]
     parts += [
         f"![{caption}]({_link(picture, out)})\n\n*{caption}*\n"
@@ -90,7 +108,7 @@ def _section(outcome: Outcome, out: Path) -> str:
     return "\n".join(parts)
 
 
-def _versions() -> str:
+def _list_versions() -> str:
     lines = [f"- Python {platform.python_version()} on {platform.machine()}, {os.cpu_count()} processors"]
     for package in PACKAGES:
         try:

@@ -6,7 +6,7 @@ call with the same settings goes on from them; trials made with other settings a
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,14 +37,36 @@ def run_trials(
     console: Console | None = None,
     label: str = "trials",
 ) -> list[Result]:
-    """Results of `trial(0)` to `trial(trials - 1)`, in that order.
+    """Run `trial(0)` to `trial(trials - 1)`, and return their results in that order.
 
-    trial: a picklable function of the seed; its result must be JSON.
-    kept: the file of finished trials, made if it is not there.
-    settings: what the results depend on besides the seed, as JSON.
-    jobs: processes; BLAS has one thread in each, so that results do not depend on `jobs`.
+    Ctrl-C stops after saying how many trials are kept.
 
-    Ctrl-C stops after saying how many trials are kept. Raises `UnconstrainError` where `kept` cannot be written.
+    Parameters
+    ----------
+    trial : callable
+        A picklable function of the seed; its result must be JSON.
+    trials : int
+        How many.
+    kept : Path
+        The file of finished trials, made if it is not there.
+    settings : dict
+        What the results depend on besides the seed, as JSON.
+    jobs : int
+        Processes; BLAS has one thread in each, so that results do not depend on `jobs`.
+    console : Console, optional
+        Where progress is shown.
+    label : str
+        Beside the progress bar.
+
+    Returns
+    -------
+    list of dict
+        A result a seed.
+
+    Raises
+    ------
+    UnconstrainError
+        If `trials` or `jobs` is not positive, or `kept` cannot be read or written.
     """
     if trials < 1 or jobs < 1:
         raise UnconstrainError(f"at least one trial and one job are needed, not {trials} and {jobs}")
@@ -66,7 +88,7 @@ def run_trials(
     with file, Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console) as progress:
         bar = progress.add_task(label, total=trials, completed=len(done))
         try:
-            for seed, result in _results(trial, missing, jobs):
+            for seed, result in _run(trial, missing, jobs):
                 file.write(json.dumps({"settings": key, "seed": seed, "result": result}) + "\n")
                 file.flush()
                 done[seed] = result
@@ -81,7 +103,7 @@ def run_trials(
     return [json.loads(json.dumps(done[seed])) for seed in range(trials)]
 
 
-def _results(trial: Callable[[int], Result], seeds: list[int], jobs: int):
+def _run(trial: Callable[[int], Result], seeds: list[int], jobs: int) -> Iterator[tuple[int, Result]]:
     if jobs == 1 or len(seeds) == 1:
         with threadpool_limits(1):
             for seed in seeds:
@@ -94,14 +116,19 @@ def _results(trial: Callable[[int], Result], seeds: list[int], jobs: int):
 
 
 def _with_seed(trial: Callable[[int], Result], seed: int) -> tuple[int, Result]:
+    """Run a trial in another process; results arrive in any order."""
     return seed, trial(seed)
 
 
 def _read(kept: Path, key: str) -> dict[int, Result]:
     if not kept.is_file():
         return {}
+    try:
+        lines = kept.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise UnconstrainError(f"cannot read the trials kept in {kept}: {error.strerror}") from error
     results = {}
-    for line in kept.read_text(encoding="utf-8").splitlines():
+    for line in lines:
         try:
             entry = json.loads(line)
             if entry["settings"] == key:

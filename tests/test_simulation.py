@@ -127,7 +127,7 @@ def test_a_diverging_policy_is_named_with_its_step():
 
 
 def test_what_does_not_fit_into_memory_is_refused_before_the_work():
-    with pytest.raises(UnconstrainError, match="1,000,000,000,001 samples from 1 start would take"):
+    with pytest.raises(UnconstrainError, match=r"1,000,000,000,001 samples from 1 start would take .* GB"):
         rollout(decay, [1.0, 2.0], steps=10**12, dt=0.1)
     with pytest.raises(UnconstrainError, match="from 1,000,000,000,000 starts would take"):
         demonstrate(10**12)

@@ -1,6 +1,6 @@
 """The DLR lightweight arm LWR-III, seven joints: closed-form kinematics for many postures at once (section 4.2).
 
-The same arm as a MuJoCo model, with shapes and inertias, is `models/lwr.xml`, which `robot()` loads.
+The same arm as a MuJoCo model, with shapes and inertias, is `models/lwr.xml`, which `load_robot()` loads.
 """
 
 from dataclasses import dataclass
@@ -12,12 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.robots import Robot, TaskConstraint
+from unconstrain.simulation import Policy, check_size, simulate
 
 Array = NDArray[np.float64]
 
-# Denavit-Hartenberg: d in metres, α in quarter turns; all a are zero, all joint axes z.
+# Denavit-Hartenberg parameters; all a are zero, all joint axes z.
 OFFSETS = np.array([0.31, 0.0, 0.4, 0.0, 0.39, 0.0, 0.078])
+"""d, in metres."""
+
 TWISTS = np.array([1, -1, -1, 1, 1, -1, 0])
+"""α, in quarter turns."""
+
 LIMITS = np.radians([170.0, 120.0, 170.0, 120.0, 170.0, 120.0, 170.0])
 """Every joint turns this far either way, in radians."""
 
@@ -28,11 +33,11 @@ HAND = "hand"
 
 @dataclass(frozen=True)
 class PowerPolicy:
-    """The paper's policy over joint angles: down the slope of a sum of powers, to the zero posture,
+    """The paper's policy over joint angles: down the slope of a sum of powers, to the zero posture.
 
         π(x) = -gain ∇ Σ_i |x_i|^p,    π_i = -gain p sign(x_i) |x_i|^(p - 1).
 
-    Attributes
+    Parameters
     ----------
     p : float
         1.5, 1.8 and 2.0 in the paper. Linear for 2; below, with infinite slope at 0.
@@ -50,19 +55,21 @@ class PowerPolicy:
             )
 
     def __call__(self, X: ArrayLike) -> Array:
-        """Actions (N, 7) in radians per step at joint angles X (N, 7) in radians."""
+        """Return actions (N, 7) in radians per step at joint angles X (N, 7) in radians."""
         X = np.asarray(X, dtype=np.float64)
         return -self.gain * self.p * np.sign(X) * np.abs(X) ** (self.p - 1)
 
 
 def pose(Q: ArrayLike) -> tuple[Array, Array]:
-    """Positions (N, 3) in metres and rotations (N, 3, 3) of the hand at joint angles Q (N, 7)."""
+    """Compute positions (N, 3) in metres and rotations (N, 3, 3) of the hand at joint angles Q (N, 7)."""
     axes, _, hand = _chain(_postures(Q))
     return hand, axes[-1]
 
 
 def jacobian(Q: ArrayLike) -> Array:
-    """Geometric Jacobians J (N, 6, 7) of the hand at joint angles Q (N, 7): ``(v, ω) = J q̇``, in the base's frame.
+    """Compute geometric Jacobians J (N, 6, 7) of the hand at joint angles Q (N, 7).
+
+    They give velocity and angular velocity in the base's frame, ``(v, ω) = J q̇``.
 
     Column i is ``(z_i × (p - p_i), z_i)``, with z_i the axis of joint i, p_i a point on it and p the hand.
     """
@@ -72,14 +79,14 @@ def jacobian(Q: ArrayLike) -> Array:
     return np.concatenate([np.cross(axes, arms), axes], axis=2).swapaxes(1, 2)
 
 
-def robot() -> Robot:
-    """The arm as MuJoCo sees it. Raises `UnconstrainError` where the extra `sim` is not installed."""
+def load_robot() -> Robot:
+    """Load the arm for MuJoCo. Raises `UnconstrainError` where the extra `sim` is not installed."""
     with as_file(files("reproduction.plants") / "models" / "lwr.xml") as path:
         return Robot.load(path)
 
 
-def starts(n_episodes: int, random_state: int | np.random.Generator | None = None) -> Array:
-    """Random postures (n_episodes, 7), each joint uniform in the middle half of its range, in radians."""
+def draw_starts(n_episodes: int, random_state: int | np.random.Generator | None = None) -> Array:
+    """Draw postures (n_episodes, 7), each joint uniform in the middle half of its range, in radians."""
     rng = np.random.default_rng(random_state)
     return rng.uniform(-LIMITS / 2, LIMITS / 2, (n_episodes, JOINTS))
 
@@ -93,14 +100,14 @@ def demonstrate(
     *,
     random_state: int | np.random.Generator | None = None,
 ) -> Demonstrations:
-    """Movements of the arm to its zero posture while its hand is constrained.
+    """Simulate movements of the arm to its zero posture while its hand is constrained.
 
-    ``u = N(x) π(x)`` with ``N = I - A⁺A``, ``A = S J(x)``, and ``x ← x + step u``, from random starts.
+    They begin at random starts, with ``u = N(x) π(x)``, ``N = I - A⁺A``, ``A = S J(x)``, and ``x ← x + step u``.
 
     Parameters
     ----------
     constraint : str, array, or TaskConstraint
-        What the hand may not do: task rows "1-2-3", the normal of a plane, or a matrix; see `TaskConstraint.of`.
+        On the hand: task rows "1-2-3", the normal of a plane, or a matrix; see `TaskConstraint.parse`.
     policy : PowerPolicy, optional
         By default the linear one.
     n_episodes, length : int
@@ -119,7 +126,7 @@ def demonstrate(
     Raises
     ------
     UnconstrainError
-        A number is not positive, or the constraint not understood.
+        If a number is not positive, the constraint is not understood, or the samples do not fit into memory.
     """
     if n_episodes < 1 or length < 1 or not (np.isfinite(step) and step > 0):
         raise UnconstrainError(
@@ -127,29 +134,45 @@ def demonstrate(
             f"{length} and {step}"
         )
     constraint, policy = TaskConstraint.parse(constraint), policy or PowerPolicy()
-    x = starts(n_episodes, random_state)
-    states, wanted, actions = np.empty((3, n_episodes, length, JOINTS))
-    projections = np.empty((n_episodes, length, JOINTS, JOINTS))
-    for k in range(length):
-        states[:, k], wanted[:, k] = x, policy(x)
-        projections[:, k] = constraint.projections(jacobian(x))
-        actions[:, k] = np.einsum("eij,ej->ei", projections[:, k], wanted[:, k])
-        x = x + step * actions[:, k]
-    names = [f"joint{i + 1}" for i in range(JOINTS)]
-    return Demonstrations(
-        states=states.reshape(-1, JOINTS),
-        actions=actions.reshape(-1, JOINTS),
-        episodes=np.repeat(np.arange(n_episodes), length),
-        time=np.tile(np.arange(length) * step, n_episodes),
-        policy=wanted.reshape(-1, JOINTS),
-        projections=projections.reshape(-1, JOINTS, JOINTS),
-        state_names=names,
-        action_names=[f"{name}_velocity" for name in names],
+    check_size(n_episodes, length, JOINTS, JOINTS, constrained=True)
+    return follow(constraint, policy, draw_starts(n_episodes, random_state), length, step)
+
+
+def follow(
+    constraint: TaskConstraint, policy: Policy, starts: ArrayLike, length: int = 100, step: float = 1.0
+) -> Demonstrations:
+    """Follow any policy from given starts under a constraint on the hand.
+
+    Parameters
+    ----------
+    constraint : TaskConstraint
+        On the hand.
+    policy : object with ``predict(X)``, or callable ``X -> U``
+        Over joint angles: the true one, or one that was learnt.
+    starts : array (S, 7) or (7,)
+        In radians.
+    length : int
+        Number of samples of each trajectory.
+    step : float
+        How long an action lasts.
+
+    Returns
+    -------
+    Demonstrations
+        As for `demonstrate`.
+    """
+    return simulate(
+        policy,
+        starts,
+        length - 1,
+        step,
+        project=lambda k, X, wanted: constraint.projections(jacobian(X)),
+        state_names=[f"joint{i + 1}" for i in range(JOINTS)],
     )
 
 
 def _chain(Q: Array) -> tuple[list[Array], list[Array], Array]:
-    """Orientations (N, 3, 3) of the eight link frames, origins (N, 3) of the seven joints, and the hand's."""
+    """Compute orientations (N, 3, 3) of the eight link frames, origins (N, 3) of the seven joints, and the hand's."""
     turn, place = np.broadcast_to(np.eye(3), (len(Q), 3, 3)), np.zeros((len(Q), 3))
     turns, origins = [turn], []
     cos, sin = np.cos(Q), np.sin(Q)

@@ -22,6 +22,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.recordings.differentiate import differentiate
 from unconstrain.robots import Robot, import_mujoco
+from unconstrain.simulation import simulate
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ CLEARANCE = 0.02
 
 @dataclass(frozen=True)
 class PhysicalRecording:
-    """What was recorded of arms in physics, and what only the simulation knows.
+    """Recordings of arms in physics, and what only the simulation knows.
 
     Attributes
     ----------
@@ -85,13 +86,19 @@ class PhysicalRecording:
 
     @property
     def ideal(self) -> Array:
-        """``N π``, (N, 7): the actions that the method supposes."""
+        """The actions ``N π`` that the method supposes, (N, 7)."""
         assert self.demonstrations.projections is not None
         assert self.demonstrations.policy is not None
         return np.einsum("nij,nj->ni", self.demonstrations.projections, self.demonstrations.policy)
 
     def off_projection(self) -> Array:
-        """Angle in radians between recorded action and ``N π`` at every sample, (N,); NaN where either is zero."""
+        """Measure the angle between recorded action and ``N π`` at every sample.
+
+        Returns
+        -------
+        array (N,)
+            In radians; NaN where either is zero.
+        """
         ideal, actions = self.ideal, self.demonstrations.actions
         lengths = np.linalg.norm(ideal, axis=1) * np.linalg.norm(actions, axis=1)
         along = np.einsum("ni,ni->n", ideal, actions)
@@ -100,14 +107,14 @@ class PhysicalRecording:
 
 
 def stage(scenario: str) -> Robot:
-    """The arm with servos, and what constrains it: a grip on the hand in space, or a table it hangs above.
+    """Equip the arm with servos, and with what constrains it: a grip on the hand, or a table it hangs above.
 
     Raises `UnconstrainError` for an unknown scenario, or where the extra `sim` is not installed.
     """
     mujoco = import_mujoco()
     if scenario not in SCENARIOS:
         raise UnconstrainError(f"there is no scenario {scenario!r}: choose one of {', '.join(SCENARIOS)}")
-    spec = arm.robot().spec.copy()
+    spec = arm.load_robot().spec.copy()
     spec.option.timestep = TIMESTEP
     # Servo and joint damping are stiff at this gain; the implicit integrator takes them in its stride.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -136,7 +143,7 @@ def demonstrate(
     encoder_noise: float = ENCODER_NOISE,
     random_state: int | np.random.Generator | None = None,
 ) -> PhysicalRecording:
-    """Movements of the arm to its zero posture, in physics.
+    """Simulate movements of the arm to its zero posture, in physics.
 
     Parameters
     ----------
@@ -153,11 +160,17 @@ def demonstrate(
     encoder_noise : float
         Standard deviation of recorded joint angles, in radians.
     random_state : int, Generator or None
+        The same number gives the same data.
+
+    Returns
+    -------
+    PhysicalRecording
+        ``n_episodes * duration * rate`` samples.
 
     Raises
     ------
     UnconstrainError
-        An unknown scenario, a number that is not positive, or a recording too short to differentiate.
+        If the scenario is unknown, a number is not positive, or a recording is too short to differentiate.
     """
     if n_episodes < 1 or not (0 < rate <= 1 / TIMESTEP) or not (duration > WINDOW) or not encoder_noise >= 0:
         raise UnconstrainError(
@@ -168,7 +181,7 @@ def demonstrate(
     policy = policy or arm.PowerPolicy(1.8, gain=0.5)
     robot = stage(scenario)
     if scenario == GRIPPED:
-        q, tables = arm.starts(n_episodes, rng), np.full((n_episodes, 7), np.nan)
+        q, tables = arm.draw_starts(n_episodes, rng), np.full((n_episodes, 7), np.nan)
         mocap = np.hstack([robot.pose(q, arm.HAND)[0], np.tile([1.0, 0, 0, 0], (n_episodes, 1))])
     else:
         q, tables = _above_tables(robot, n_episodes, rng)
@@ -209,22 +222,25 @@ def demonstrate(
 def _simulate(
     robot: Robot, policy: arm.PowerPolicy, q: Array, mocap: Array, samples: int, every: int
 ) -> tuple[Array, Array]:
-    """Joint angles (S, samples, 7) and touch (S, samples) in newtons, a sample each `every` steps."""
+    """Simulate joint angles (S, samples, 7) and touch (S, samples) in newtons, a sample each `every` steps."""
     batch = import_mujoco().batch.Batch(robot.model, len(q), 1)
     batch.qpos, batch.mocap_pos, batch.mocap_quat = q, mocap[:, None, :3], mocap[:, None, 3:]
     qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
     touch = batch.bind("sensordata") if robot.model.nsensor else None
-    states, force = np.empty((len(q), samples, arm.JOINTS)), np.zeros((len(q), samples))
-    for step in range(-round(SETTLING / TIMESTEP), samples * every):
-        sample, recorded = step // every, step >= 0 and step % every == 0
-        if recorded:
-            states[:, sample] = qpos
-        ctrl[:] = policy(qpos)
+    forces: list[Array] = []
+
+    # MuJoCo moves the arms: the policy's actions are what the servos are told, and only part of what happens.
+    def advance(X: Array, U: Array) -> tuple[Array, Array]:
+        ctrl[:] = U
         batch.step()
         # Forces are known after the step, and are those of the state before it.
-        if touch is not None and recorded:
-            force[:, sample] = touch[:, 0]
-    return states, force
+        forces.append(np.zeros(len(q)) if touch is None else touch[:, 0].copy())
+        return qpos.copy(), U
+
+    settling = round(SETTLING / TIMESTEP)
+    followed = simulate(policy, q, settling + (samples - 1) * every, TIMESTEP, advance=advance)
+    states = followed.states.reshape(len(q), -1, arm.JOINTS)
+    return states[:, settling::every], np.stack(forces[settling::every], axis=1)
 
 
 def _add_grip(spec: Any) -> None:
@@ -252,11 +268,11 @@ def _add_table(spec: Any) -> None:
 
 
 def _above_tables(robot: Robot, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Starts (count, 7) whose tip is above their table, and the tables' positions and quaternions (count, 7)."""
+    """Draw starts (count, 7) whose tip is above their table, and the tables' positions and quaternions (count, 7)."""
     starts, tables = np.empty((count, arm.JOINTS)), np.empty((count, 7))
     done = 0
     while done < count:
-        q = arm.starts(4 * count, rng)
+        q = arm.draw_starts(4 * count, rng)
         depth, tilt, heading = rng.uniform([DEPTH[0], 0.0, -np.pi], [DEPTH[1], TILT, np.pi], (len(q), 3)).T
         # A turn by the tilt about a level axis of any heading.
         half = np.sin(tilt / 2)
@@ -272,13 +288,13 @@ def _above_tables(robot: Robot, count: int, rng: np.random.Generator) -> tuple[A
 
 
 def _normals(tables: Array) -> Array:
-    """The z axes (N, 3) of tables (N, 7)."""
+    """Compute the z axes (N, 3) of tables (N, 7)."""
     w, x, y, z = tables[:, 3:].T
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x**2 + y**2)], axis=1)
 
 
-def staged(recording: PhysicalRecording, scenario: str, episode: int) -> Robot:
-    """The arm with the grip or the table where it was in an episode, to be drawn."""
+def stage_episode(recording: PhysicalRecording, scenario: str, episode: int) -> Robot:
+    """Stage the arm with the grip or the table where it was in an episode, to be drawn."""
     spec = stage(scenario).spec.copy()
     if scenario == GRIPPED:
         start = recording.demonstrations.episode(episode).states[:1]

@@ -1,4 +1,4 @@
-"""What stands in the way of a robot's hands: walls, and barriers with a gap in them.
+"""Obstacles in the way of a robot's hands: walls, and barriers with a gap in them.
 
 A hand that comes closer than `CLEARANCE` to an obstacle, and would come closer still, loses its motion along the
 obstacle's normal: `nᵀ ẋ = 0` for that hand, and nothing else. Sources: ICRA 2009, Sec. IV-C and IV-D.
@@ -21,7 +21,7 @@ CLEARANCE = 0.05
 class Wall:
     """Endless planes, one for each of S movements.
 
-    Attributes
+    Parameters
     ----------
     points : array (S, 3)
         A point of each plane, in metres.
@@ -33,7 +33,7 @@ class Wall:
     normals: Array
 
     def nearest(self, x: Array) -> tuple[Array, Array]:
-        """Distances (S, 1) of points x (S, 3), negative inside the wall, and normals (S, 1, 3)."""
+        """Compute distances (S, 1) of points x (S, 3), negative inside the wall, and normals (S, 1, 3)."""
         distance = np.einsum("sd,sd->s", x - self.points, self.normals)
         return distance[:, None], self.normals[:, None, :]
 
@@ -42,7 +42,7 @@ class Wall:
 class Barrier:
     """Upright slabs of K boxes, for each of S movements.
 
-    Attributes
+    Parameters
     ----------
     low, high : arrays (S, K, 3)
         Corners of the boxes, in metres. A box without volume is no obstacle.
@@ -52,7 +52,7 @@ class Barrier:
     high: Array
 
     def nearest(self, x: Array) -> tuple[Array, Array]:
-        """Distances (S, K) from points x (S, 3) to each box, and the directions (S, K, 3) away from it.
+        """Compute distances (S, K) from points x (S, 3) to each box, and the directions (S, K, 3) away from it.
 
         A box's normal is the direction from its nearest point: along an axis before a face, turning around an edge.
         Inside a box the distance is negative and the normal that of the nearest face.
@@ -70,7 +70,7 @@ class Barrier:
         return np.where(solid, distance, np.inf), normal
 
 
-def with_gap(
+def make_with_gap(
     widths: ArrayLike,
     x: float,
     bottom: float,
@@ -80,7 +80,7 @@ def with_gap(
     height: float,
     centre: float = 0.0,
 ) -> Barrier:
-    """A barrier across the robot's way with a gap in it, one for each of the `widths` (S,).
+    """Make barriers across the robot's way with a gap in them, one for each of the `widths` (S,).
 
     Parameters
     ----------
@@ -92,6 +92,16 @@ def with_gap(
         Extents along x, y and z, in metres.
     centre : float
         Where along y the gap's middle is, in metres.
+
+    Returns
+    -------
+    Barrier
+        Of S movements.
+
+    Raises
+    ------
+    UnconstrainError
+        If the widths are not one for each movement.
     """
     half = np.clip(np.atleast_1d(np.asarray(widths, dtype=np.float64)), 0.0, span) / 2
     if half.ndim != 1:
@@ -104,17 +114,19 @@ def with_gap(
     return Barrier(low, high)
 
 
-def central(n: int, x: float, bottom: float, *, thickness: float, width: float, height: float) -> Barrier:
-    """A barrier without a gap that stands in the middle and has to be reached around, for n movements."""
+def make_central(
+    n: int, x: float, bottom: float, *, thickness: float, width: float, height: float
+) -> Barrier:
+    """Make a barrier without a gap that stands in the middle and has to be reached around, for n movements."""
     low = np.array([x - thickness / 2, -width / 2, bottom])
     high = np.array([x + thickness / 2, width / 2, bottom + height])
     return Barrier(np.tile(low, (n, 1, 1)), np.tile(high, (n, 1, 1)))
 
 
-def blocking(
+def find_blocking(
     obstacle: Wall | Barrier, hands: Array, velocities: Array, clearance: float = CLEARANCE
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """The normals that constrain each hand, and whether they do.
+    """Find the normals that constrain each hand, and whether they do.
 
     Parameters
     ----------
@@ -129,7 +141,8 @@ def blocking(
     -------
     rows : array (S, H, K, 3)
         Normals n with ``nᵀ ẋ = 0``; zero where nothing is in the way.
-    blocked : array (S, H)
+    blocked : array (S, H) of bool
+        Which hands have a normal that is not zero.
     """
     rows = []
     for hand in range(hands.shape[1]):

@@ -1,17 +1,18 @@
 """A planar finger that stretches out, and slides along whatever lies in its way (section 1, Fig. 1)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
+from reproduction.plants.box import Box
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.simulation import simulate
 
 Array = NDArray[np.float64]
 
@@ -24,63 +25,36 @@ PENETRATION = 1e-5
 SUBSTEPS = 3
 """Integration steps between two recorded samples."""
 
+NEWTON_STEPS = 10
+"""At most so many lead back onto a surface after a straight step; two or three do."""
+
 
 @dataclass(frozen=True)
-class Box:
-    """An obstacle: a rectangle with rounded corners.
+class Contacts:
+    """All places where the finger could touch obstacles at one posture.
 
     Attributes
     ----------
-    center, size : (float, float)
-        Middle, and full width and height before turning, in metres.
-    angle : float
-        Turned counterclockwise by this, in radians.
-    rounding : float
-        Radius of the corners in metres.
+    distances : array (m,)
+        Signed distances in metres, negative inside.
+    rows : array (m, 3)
+        Their gradients over the joints.
     """
 
-    center: tuple[float, float]
-    size: tuple[float, float]
-    angle: float = 0.0
-    rounding: float = 0.002
+    distances: Array
+    rows: Array
 
-    def __post_init__(self) -> None:
-        if not np.isfinite([*self.center, *self.size, self.angle, self.rounding]).all():
-            raise UnconstrainError("an obstacle's center, size, angle and rounding must be finite numbers")
-        if not 0 <= 2 * self.rounding < min(self.size):
-            raise UnconstrainError(
-                f"an obstacle of size {self.size} cannot have corners of radius {self.rounding}: "
-                "keep the radius under half of the shorter side"
-            )
+    def pressing(self, wanted: Array) -> NDArray[np.intp]:
+        """Return the indices of the contacts that push back when the finger wants to move by `wanted` (3,).
 
-    @cached_property
-    def axes(self) -> Array:
-        """The box's own axes as rows (2, 2)."""
-        c, s = np.cos(self.angle), np.sin(self.angle)
-        return np.array([[c, s], [-s, c]])
-
-    @cached_property
-    def core(self) -> Array:
-        """Half the sides (2,) of the sharp rectangle that, grown by `rounding`, is the box."""
-        return np.array(self.size) / 2 - self.rounding
-
-    @cached_property
-    def corners(self) -> Array:
-        """Corners (4, 2) of that sharp rectangle, counterclockwise."""
-        signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-        return self.center + (signs * self.core) @ self.axes
-
-    def nearest(self, points: Array) -> Array:
-        """The points (..., 2) of the sharp rectangle nearest to the given ones (..., 2)."""
-        local = (points - self.center) @ self.axes.T
-        return self.center + np.clip(local, -self.core, self.core) @ self.axes
-
-    def outline(self) -> Array:
-        """The rounded outline (M, 2), for drawing."""
-        quarter = np.linspace(0, np.pi / 2, 9)
-        start = self.angle + np.arange(4)[:, None] * np.pi / 2 + quarter
-        arcs = self.corners[:, None] + self.rounding * np.stack([np.cos(start), np.sin(start)], axis=-1)
-        return arcs.reshape(-1, 2)
+        They are the active set of ``min_u ‖u - π(q)‖²`` under ``rows u >= 0`` where finger and obstacle touch. Its
+        dual is ``min_λ ‖π + rowsᵀ λ‖²`` under ``λ >= 0``; contacts with λ > 0 are active.
+        """
+        touching = np.flatnonzero(self.distances <= TOUCHING)
+        if not len(touching):
+            return touching
+        force, _ = nnls(self.rows[touching].T, -wanted)
+        return touching[force > 0]
 
 
 @dataclass(frozen=True)
@@ -90,7 +64,7 @@ class Finger:
     Stretched out (q = 0) the finger points along +x; positive angles bend it downwards. The policy moves
     every joint towards zero, ``π(q) = -gain q``.
 
-    Attributes
+    Parameters
     ----------
     lengths : (float, float, float)
         Of the phalanges from base to tip, in metres.
@@ -105,30 +79,30 @@ class Finger:
     gain: float = 1.0
 
     def policy(self, Q: ArrayLike) -> Array:
-        """Joint velocities (N, 3) in rad/s at joint angles (N, 3)."""
+        """Return joint velocities (N, 3) in rad/s at joint angles (N, 3)."""
         return -self.gain * self._postures(Q)
 
     def joints(self, Q: ArrayLike) -> Array:
-        """Positions (N, 4, 2) in metres of the base, the two inner joints and the tip."""
+        """Return the positions (N, 4, 2) in metres of the base, the two inner joints and the tip."""
         heading = -np.cumsum(self._postures(Q), axis=1)
         links = np.array(self.lengths)[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
         return np.concatenate([np.zeros((len(links), 1, 2)), np.cumsum(links, axis=1)], axis=1)
 
     def clearance(self, Q: ArrayLike, obstacles: Box | Sequence[Box]) -> Array:
-        """Least distance (N,) in metres between finger and obstacles; negative inside, inf without any."""
+        """Return the least distance (N,) in metres between finger and obstacles; negative inside, inf without any."""
         boxes = _boxes(obstacles)
-        return np.array([self._contacts(q, boxes)[0].min(initial=np.inf) for q in self._postures(Q)])
+        return np.array([self.contacts(q, boxes).distances.min(initial=np.inf) for q in self._postures(Q)])
 
     def constraint(self, q: ArrayLike, obstacles: Box | Sequence[Box]) -> Array:
-        """Rows (k, 3) of the contacts that stop the policy at posture q (3,): ``A u = 0``.
+        """Return the rows (k, 3) of the contacts that stop the policy at posture q (3,): ``A u = 0``.
 
         A contact at point p with outward normal n lets the finger leave but not enter, ``nᵀ J(p) u >= 0``.
         The admissible action nearest to the policy presses on some of the contacts and leaves the others;
         only the former constrain: on them ``u = N π(q)``, and the finger slides.
         """
-        posture = self._postures(np.atleast_2d(q))[0]
-        contacts = self._contacts(posture, _boxes(obstacles))
-        return contacts[1][self._pressing(posture, contacts)]
+        posture = self._postures(np.atleast_2d(q))
+        contacts = self.contacts(posture[0], _boxes(obstacles))
+        return contacts.rows[contacts.pressing(self.policy(posture)[0])]
 
     def demonstrate(
         self,
@@ -170,69 +144,22 @@ class Finger:
         for index, (q, boxes) in enumerate(zip(starts, scenes, strict=True)):
             if self.clearance(q[None], boxes)[0] < 0:
                 raise DataError(f"start {index} lies inside an obstacle: move one of the two away")
-        d = len(self.lengths)
-        states, projections = np.empty((len(starts), length, d)), np.empty((len(starts), length, d, d))
-        for episode, (q, boxes) in enumerate(zip(starts, scenes, strict=True)):
-            contacts = self._contacts(q, boxes)
-            for k in range(length):
-                states[episode, k] = q
-                projections[episode, k] = projection(contacts[1][self._pressing(q, contacts)])
-                for _ in range(SUBSTEPS):
-                    q, contacts = self._step(q, contacts, boxes, 1 / (rate * SUBSTEPS))
-        X, N = states.reshape(-1, d), projections.reshape(-1, d, d)
-        wanted = self.policy(X)
-        names = [f"joint{i + 1}" for i in range(d)]
-        return Demonstrations(
-            states=X,
-            actions=np.einsum("nij,nj->ni", N, wanted),
-            episodes=np.repeat(np.arange(len(starts)), length),
-            time=np.tile(np.arange(length) / rate, len(starts)),
-            policy=wanted,
-            projections=N,
-            state_names=tuple(names),
-            action_names=tuple(f"{name}_velocity" for name in names),
-        )
+        # Each start has its own obstacles, so that movements cannot be followed side by side.
+        movements = [
+            _slide(self, q, boxes, length, rate).select(slice(None, None, SUBSTEPS))
+            for q, boxes in zip(starts, scenes, strict=True)
+        ]
+        labels = tuple(str(episode) for episode in range(len(starts)))
+        return replace(Demonstrations.concatenate(movements), episode_labels=labels)
 
-    def _step(
-        self, q: Array, contacts: tuple[Array, Array], boxes: Sequence[Box], dt: float
-    ) -> tuple[Array, tuple[Array, Array]]:
-        """One integration step, and back onto the surfaces it slid along or ran into: q and its contacts."""
-        sliding = self._pressing(q, contacts)
-        action = self.policy(q[None])[0]
-        q = q + dt * (projection(contacts[1][sliding]) @ action if len(sliding) else action)
-        contacts = self._contacts(q, boxes)
-        # A straight step leaves a curved surface, either way, by the square of the step: a few Newton steps
-        # lead back. Contacts that do not press are only pushed out, never pulled in.
-        for _ in range(10):
-            distances, rows = contacts
-            off = distances < 0
-            off[sliding] = True
-            if np.all(np.abs(distances[off]) < PENETRATION / 10):
-                break
-            q = q - np.linalg.lstsq(rows[off], distances[off], rcond=1e-6)[0]
-            contacts = self._contacts(q, boxes)
-        return q, contacts
-
-    def _pressing(self, q: Array, contacts: tuple[Array, Array]) -> NDArray[np.intp]:
-        """Which contacts push back, from ``min_u ‖u - π(q)‖²`` under ``rows u >= 0`` where finger and box touch.
-
-        Its dual is ``min_λ ‖π + rowsᵀ λ‖²`` under ``λ >= 0``; contacts with λ > 0 are the active set.
-        """
-        distances, rows = contacts
-        touching = np.flatnonzero(distances <= TOUCHING)
-        if not len(touching):
-            return touching
-        force, _ = nnls(rows[touching].T, -self.policy(q[None])[0])
-        return touching[force > 0]
-
-    def _contacts(self, q: Array, boxes: Sequence[Box]) -> tuple[Array, Array]:
-        """Signed distances (m,) of all places where the finger could touch, and their gradients (m, 3) in q.
+    def contacts(self, q: Array, boxes: Sequence[Box]) -> Contacts:
+        """Find all places where the finger could touch the boxes at posture q (3,).
 
         A phalanx (a thick line) and a box can touch at either end of the phalanx or at a corner of the box;
         a phalanx flat against a side touches at two of them. Each distance is smooth in q.
         """
         if not boxes:
-            return np.empty(0), np.empty((0, len(q)))
+            return Contacts(np.empty(0), np.empty((0, len(q))))
         joints = self.joints(q[None])[0]
         a, along = joints[:-1], np.diff(joints, axis=0)
         corners = np.array([box.corners for box in boxes])
@@ -260,10 +187,10 @@ class Finger:
         reach = self.radius + np.concatenate(
             [np.repeat(rounding, len(joints)), np.repeat(rounding, 4 * len(a))]
         )
-        return length - reach, rows
+        return Contacts(length - reach, rows)
 
     def outlines(self, q: ArrayLike) -> Array:
-        """Outlines (3, M, 2) in metres of the phalanges at posture q (3,), as thick as they are, for drawing."""
+        """Trace the outlines (3, M, 2) in metres of the phalanges at posture q (3,), for drawing."""
         joints = self.joints(np.atleast_2d(q))[0]
         shapes = []
         for a, b in pairwise(joints):
@@ -283,6 +210,53 @@ class Finger:
         if not np.isfinite(Q).all():
             raise DataError("a posture of the finger has NaN or infinity: give joint angles in radians")
         return Q
+
+
+class _Sliding:
+    """One movement of a finger: which contacts press at its posture, and where it gets from there.
+
+    The contacts are those of the posture that `advance` left the finger in, the start at first.
+    """
+
+    def __init__(self, finger: Finger, start: Array, boxes: Sequence[Box], dt: float):
+        self.finger, self.boxes, self.dt = finger, boxes, dt
+        self.contacts = finger.contacts(start, boxes)
+        self.pressing = np.empty(0, dtype=np.intp)
+
+    def project(self, sample: int, X: Array, wanted: Array) -> Array:
+        self.pressing = self.contacts.pressing(wanted[0])
+        return projection(self.contacts.rows[self.pressing])[None]
+
+    def advance(self, X: Array, U: Array) -> tuple[Array, Array]:
+        """One step, and back onto the surfaces that the finger slid along or ran into."""
+        q = X[0] + self.dt * U[0]
+        self.contacts = self.finger.contacts(q, self.boxes)
+        # A straight step leaves a curved surface, either way, by the square of the step: a few Newton steps
+        # lead back. Contacts that do not press are only pushed out, never pulled in.
+        for _ in range(NEWTON_STEPS):
+            distances, rows = self.contacts.distances, self.contacts.rows
+            off = distances < 0
+            off[self.pressing] = True
+            if np.all(np.abs(distances[off]) < PENETRATION / 10):
+                break
+            q = q - np.linalg.lstsq(rows[off], distances[off], rcond=1e-6)[0]
+            self.contacts = self.finger.contacts(q, self.boxes)
+        return q[None], U
+
+
+def _slide(finger: Finger, start: Array, boxes: Sequence[Box], length: int, rate: float) -> Demonstrations:
+    """Follow a movement at `SUBSTEPS` times the rate of its samples."""
+    dt = 1 / (rate * SUBSTEPS)
+    sliding = _Sliding(finger, start, boxes, dt)
+    return simulate(
+        finger.policy,
+        start,
+        (length - 1) * SUBSTEPS,
+        dt,
+        project=sliding.project,
+        advance=sliding.advance,
+        state_names=[f"joint{i + 1}" for i in range(len(start))],
+    )
 
 
 def _boxes(obstacles: Box | Sequence[Box]) -> Sequence[Box]:

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reproduction.plants.barrier import Barrier, blocking
+from reproduction.plants.barrier import Barrier, find_blocking
 from reproduction.plants.humanoid import Humanoid
 from reproduction.plants.scene import Scene
-from reproduction.plants.whole_body import WholeBody, floating
+from reproduction.plants.whole_body import WholeBody, make_floating
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
+from unconstrain.simulation import Policy, simulate
 
 Array = NDArray[np.float64]
 
@@ -33,23 +34,43 @@ class Attractor:
     """The expert's policy `π(x) = -ρ ∇φ(x)`, `φ = α (1 - exp(-‖x - x_c‖² / 2σ²))`, over both hands.
 
     The paper prints +∇φ, which would drive the hands away. Equation (12).
+
+    Parameters
+    ----------
+    target : array (6,)
+        x_c, where the hands grasp, in metres.
     """
 
     target: Array
 
     def __call__(self, X: ArrayLike) -> Array:
-        """Velocities (N, 6) in m/s at hand positions X (N, 6)."""
+        """Return velocities (N, 6) in m/s at hand positions X (N, 6)."""
         error = np.asarray(X, dtype=np.float64) - self.target
         steepness = np.exp(-np.sum(error**2, axis=1, keepdims=True) / (2 * SIGMA_SQUARED))
         return -RATE * ALPHA / SIGMA_SQUARED * error * steepness
 
 
 def constrain(obstacle: Barrier | None, X: Array, Pi: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Projections N (S, 6, 6) of the obstacle at hand positions X (S, 6), and which hands (S, 2) it blocks."""
+    """Find out how an obstacle constrains both hands.
+
+    Parameters
+    ----------
+    obstacle : Barrier or None
+        One for each of S movements.
+    X, Pi : array (S, 6)
+        The hands' positions, and how the policy would move them, in m and m/s.
+
+    Returns
+    -------
+    projections : array (S, 6, 6)
+        N.
+    blocked : array (S, 2) of bool
+        Which hands the obstacle stops.
+    """
     S = len(X)
     if obstacle is None:
         return np.tile(np.eye(6), (S, 1, 1)), np.zeros((S, 2), dtype=bool)
-    rows, blocked = blocking(obstacle, X.reshape(S, 2, 3), Pi.reshape(S, 2, 3))
+    rows, blocked = find_blocking(obstacle, X.reshape(S, 2, 3), Pi.reshape(S, 2, 3))
     A = np.zeros((S, 2, rows.shape[2], 2, 3))
     for hand in range(2):
         A[:, hand, :, hand] = rows[:, hand]
@@ -90,26 +111,42 @@ class Demonstrator:
     Parameters
     ----------
     humanoid : Humanoid
+        Its home posture decides where the scene is.
     """
 
     def __init__(self, humanoid: Humanoid):
         self.humanoid = humanoid
         self.scene = Scene(WholeBody(humanoid).hands.mean(axis=0), humanoid.floor)
         self.policy = Attractor(self.scene.grasp)
-        self._model = floating(humanoid).compile()
+        self._model = make_floating(humanoid).compile()
 
-    def starts(self, n: int, rng: np.random.Generator, model: Any = None) -> list[WholeBody]:
-        """n robots standing in random postures ~ N(q0, 0.1 I), free of self-collision, hands where the scene admits.
+    def draw_starts(self, n: int, rng: np.random.Generator, model: Any = None) -> list[WholeBody]:
+        """Make n robots stand in random postures ~ N(q0, 0.1 I), free of self-collision, hands where the scene admits.
 
-        `model` is that of `WholeBody`, where the robot shall stand in a scene that is shown.
+        Parameters
+        ----------
+        n : int
+            Number of robots.
+        rng : Generator
+            That the postures are drawn from.
+        model : mujoco.MjModel, optional
+            That of `WholeBody`, if the robot shall stand in a scene that is shown.
 
-        Raises `UnconstrainError` if hardly any posture is admitted.
+        Returns
+        -------
+        list of WholeBody
+            One for each movement.
+
+        Raises
+        ------
+        UnconstrainError
+            If hardly any posture is admitted.
         """
         bodies: list[WholeBody] = []
         model = self._model if model is None else model
         body, tries = WholeBody(self.humanoid, model), 1000 + 100 * n
         for _ in range(tries):
-            body.stand(self.humanoid.start_postures(1, rng)[0])
+            body.stand(self.humanoid.draw_postures(1, rng)[0])
             if self.scene.admits(body.hands) and not self.humanoid.touches_itself(body.posture):
                 bodies.append(body)
                 if len(bodies) == n:
@@ -121,31 +158,69 @@ class Demonstrator:
         )
 
     def record(
-        self, obstacle: Barrier | None, bodies: list[WholeBody], *, policy=None, duration: float = DURATION
+        self,
+        obstacle: Barrier | None,
+        bodies: list[WholeBody],
+        *,
+        policy: Policy | None = None,
+        duration: float = DURATION,
     ) -> Recording:
-        """Let the robots move from where they stand, under the obstacle (one barrier each), and record their hands."""
-        policy = policy or self.policy
+        """Let robots move from where they stand, and record their hands.
+
+        Parameters
+        ----------
+        obstacle : Barrier or None
+            One for each robot.
+        bodies : list of WholeBody
+            Are moved.
+        policy : object with ``predict(X)``, or callable ``X -> U``, optional
+            Over both hands' positions (N, 6); by default the expert's.
+        duration : float
+            In seconds.
+
+        Returns
+        -------
+        Recording
+            ``duration * FREQUENCY`` samples per robot.
+        """
         S, length = len(bodies), round(duration * FREQUENCY)
-        X, U, Pi, commanded = np.empty((4, S, length, 6))
-        N, blocked = np.empty((S, length, 6, 6)), np.empty((S, length, 2), dtype=bool)
-        postures = np.empty((S, length, self._model.nq))
-        for k in range(length):
-            X[:, k] = [body.hands.ravel() for body in bodies]
-            Pi[:, k] = policy(X[:, k])
-            postures[:, k] = [body.data.qpos for body in bodies]
-            N[:, k], blocked[:, k] = constrain(obstacle, X[:, k], Pi[:, k])
-            commanded[:, k] = np.einsum("sij,sj->si", N[:, k], Pi[:, k])
-            for s, body in enumerate(bodies):
-                U[s, k] = body.move(commanded[s, k].reshape(2, 3), 1 / FREQUENCY).ravel()
-        demonstrations = Demonstrations(
-            states=X.reshape(-1, 6),
-            actions=U.reshape(-1, 6),
-            episodes=np.repeat(np.arange(S), length),
-            time=np.tile(np.arange(length) / FREQUENCY, S),
-            policy=Pi.reshape(-1, 6),
-            projections=N.reshape(-1, 6, 6),
+        blocked: list[NDArray[np.bool_]] = []
+        postures: list[Array] = []
+
+        def project(sample: int, X: Array, wanted: Array) -> Array:
+            N, stopped = constrain(obstacle, X, wanted)
+            blocked.append(stopped)
+            return N
+
+        # Whole-body control moves the hands, nearly as commanded; what they really did is recorded.
+        def advance(X: Array, commanded: Array) -> tuple[Array, Array]:
+            postures.append(np.stack([body.data.qpos.copy() for body in bodies]))
+            realised = [
+                body.move(velocities.reshape(2, 3), 1 / FREQUENCY).ravel()
+                for body, velocities in zip(bodies, commanded, strict=True)
+            ]
+            return _stack_hands(bodies), np.stack(realised)
+
+        demonstrations = simulate(
+            policy or self.policy,
+            _stack_hands(bodies),
+            length - 1,
+            1 / FREQUENCY,
+            project=project,
+            advance=advance,
             state_names=STATE_NAMES,
-            action_names=[f"{name}_velocity" for name in STATE_NAMES],
         )
-        tracking = np.linalg.norm(U - commanded) / np.linalg.norm(commanded)
-        return Recording(demonstrations, blocked.reshape(-1, 2), float(tracking), postures)
+        assert demonstrations.policy is not None
+        assert demonstrations.projections is not None
+        commanded = np.einsum("nij,nj->ni", demonstrations.projections, demonstrations.policy)
+        off, speed = (np.linalg.norm(each) for each in (demonstrations.actions - commanded, commanded))
+        return Recording(
+            demonstrations,
+            np.stack(blocked, axis=1).reshape(S * length, 2),
+            float(off / speed) if speed else 0.0,
+            np.stack(postures, axis=1),
+        )
+
+
+def _stack_hands(bodies: list[WholeBody]) -> Array:
+    return np.stack([body.hands.ravel() for body in bodies])

@@ -5,11 +5,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.robots import Robot, RobotError, import_mujoco
+
+if TYPE_CHECKING:
+    import mujoco
 
 Array = NDArray[np.float64]
 
@@ -25,9 +29,10 @@ STRETCH, STRETCH_STEPS = (1.0, 0.0, 0.3), 400
 class Humanoid:
     """A robot with two hands, its pelvis standing still, x forward and z up.
 
-    Attributes
+    Parameters
     ----------
     robot : Robot
+        Its base stands still.
     hands : (str, str)
         Frames of the left and the right hand.
     feet : (str, str) or None
@@ -50,25 +55,34 @@ class Humanoid:
         hands: str | Iterable[str] = (),
         feet: str | Iterable[str] = (),
     ) -> "Humanoid":
-        """The project's own humanoid, or any robot from an MJCF or URDF file.
+        """Load the project's own humanoid, or any robot from an MJCF or URDF file.
 
         Parameters
         ----------
-        path : of the robot's file; without it the humanoid that is shipped with the library.
-        lock : joints to hold still, as for `Robot`; names may also come in one string, with commas.
-        hands : names of the left and the right hand's frame; needed for any robot but our own. "LEFT,RIGHT" will do.
-        feet : names of the left and the right foot's body, to be kept on the floor while the pelvis moves; without
+        path : str or path, optional
+            Of the robot's file; without it the humanoid that comes with these experiments.
+        lock : iterable of str, or mapping from str to float
+            Joints to hold still, as for `Robot`; names may also come in one string, with commas.
+        hands : iterable of str
+            Names of the left and the right hand's frame; needed for any robot but our own. "LEFT,RIGHT" will do.
+        feet : iterable of str
+            Names of the left and the right foot's body, to be kept on the floor while the pelvis moves; without
             them another robot's base stands still.
+
+        Returns
+        -------
+        Humanoid
+            At home.
 
         Raises
         ------
         RobotError
-            There is no such file, joint or frame, or not two hands.
+            If there is no such file, joint or frame, or not two hands.
         """
         robot = Robot.load(
-            MODEL if path is None else path, lock=names(lock) if isinstance(lock, str) else lock
+            MODEL if path is None else path, lock=split_names(lock) if isinstance(lock, str) else lock
         )
-        hands, feet = names(hands), names(feet)
+        hands, feet = split_names(hands), split_names(feet)
         if path is None:
             hands, feet = hands or HANDS, feet or FEET
         for name, frames, allowed in (("hands", hands, (2,)), ("feet", feet, (0, 2))):
@@ -89,20 +103,32 @@ class Humanoid:
         return self.robot.n
 
     def hand_motion(self, Q: Array) -> tuple[Array, Array]:
-        """Positions (N, 2, 3) in metres of both hands, left first, at postures Q (N, n), and Jacobians (N, 2, 3, n).
+        """Compute where both hands are, and their Jacobians.
 
         `Robot.pose` and `Robot.jacobian` give the same one frame at a time; here one pass over the robot serves
         all of it, which matters to the million postures of an experiment.
+
+        Parameters
+        ----------
+        Q : array (N, n)
+            Postures, in radians.
+
+        Returns
+        -------
+        positions : array (N, 2, 3)
+            Of both hands in metres, left first.
+        jacobians : array (N, 2, 3, n)
+            Of the positions.
         """
-        mujoco, model, data = import_mujoco(), self.robot.model, self._data
+        mj, model, data = import_mujoco(), self.robot.model, self._data
         X, J = np.empty((len(Q), 2, 3)), np.empty((len(Q), 2, 3, self.n))
         for q, x, jacobian in zip(Q, X, J, strict=True):
             data.qpos = q
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)  # Jacobians are taken from the motion axes this fills in
+            mj.mj_kinematics(model, data)
+            mj.mj_comPos(model, data)  # Jacobians are taken from the motion axes this fills in
             for hand, (positions, index, body) in enumerate(self._hand_frames):
                 x[hand] = positions[index]
-                mujoco.mj_jac(model, data, jacobian[hand], None, x[hand], body)
+                mj.mj_jac(model, data, jacobian[hand], None, x[hand], body)
         return X, J
 
     @cached_property
@@ -135,10 +161,11 @@ class Humanoid:
             q = np.clip(q + np.einsum("hdn,hd->n", J[0], error), *self.robot.limits.T)
         return q
 
-    def start_postures(self, n: int, rng: np.random.Generator, variance: float = 0.1) -> Array:
-        """Postures Q (n, joints) ~ N(q0, variance I), clipped to the joint limits and free of self-collision.
+    def draw_postures(self, n: int, rng: np.random.Generator, variance: float = 0.1) -> Array:
+        """Draw postures (n, joints) ~ N(q0, variance I), clipped to the joint limits and free of self-collision.
 
-        A posture in which the robot touches itself, otherwise than it does at home, is drawn anew. variance in rad².
+        A posture in which the robot touches itself, otherwise than it does at home, is drawn anew. The variance is in
+        rad².
         """
         postures = np.empty((n, self.n))
         for i in range(n):
@@ -151,7 +178,7 @@ class Humanoid:
         return postures
 
     def touches_itself(self, q: Array) -> bool:
-        """Whether two bodies of the robot are in contact at posture q (n,) that are not at home."""
+        """Tell whether two bodies of the robot are in contact at posture q (n,) that are not at home."""
         return bool(self._contacts(q) - self._contacts_at_home)
 
     @cached_property
@@ -159,7 +186,7 @@ class Humanoid:
         return self._contacts(self.home)
 
     @cached_property
-    def _data(self):
+    def _data(self) -> "mujoco.MjData":
         return import_mujoco().MjData(self.robot.model)
 
     @cached_property
@@ -176,16 +203,16 @@ class Humanoid:
         ]
 
     def _contacts(self, q: Array) -> set[tuple[int, int]]:
-        mujoco, model, data = import_mujoco(), self.robot.model, self._data
+        mj, model, data = import_mujoco(), self.robot.model, self._data
         data.qpos[:] = q
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_collision(model, data)
+        mj.mj_kinematics(model, data)
+        mj.mj_collision(model, data)
         bodies = model.geom_bodyid[data.contact.geom.reshape(-1, 2)]
         return {(int(a), int(b)) for a, b in np.sort(bodies, axis=1)}
 
 
-def names(given: str | Iterable[str]) -> tuple[str, ...]:
-    """Names given one by one, or in one string with commas."""
+def split_names(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Take names given one by one, or in one string with commas."""
     if isinstance(given, str):
         return tuple(name.strip() for name in given.split(",") if name.strip())
     return tuple(given)

@@ -10,19 +10,22 @@ from numpy.typing import ArrayLike, NDArray
 class PlanarArm:
     """Links in a chain, joint angles relative to the link before: ``θ_i = Σ_{j<=i} q_j``.
 
-    lengths: of the links, in metres.
+    Parameters
+    ----------
+    lengths : tuple of float
+        Of the links, in metres.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0)
 
     def pose(self, Q: ArrayLike) -> NDArray[np.float64]:
-        """The hand's x and y (m) and its orientation (rad), (N, 3), at joint angles Q (N, d) in radians."""
+        """Compute the hand's x and y (m) and its orientation (rad), (N, 3), at joint angles Q (N, d) in radians."""
         turned = np.cumsum(np.asarray(Q, dtype=np.float64), axis=1)
         reach = np.asarray(self.lengths)
         return np.stack([np.cos(turned) @ reach, np.sin(turned) @ reach, turned[:, -1]], axis=1)
 
     def jacobian(self, Q: ArrayLike) -> NDArray[np.float64]:
-        """Derivatives of `pose`, (N, 3, d): joint j moves all links from j on."""
+        """Compute the derivatives of `pose`, (N, 3, d): joint j moves all links from j on."""
         turned = np.cumsum(np.asarray(Q, dtype=np.float64), axis=1)
         reach = np.asarray(self.lengths)
 

@@ -24,6 +24,7 @@ class Camera:
     Parameters
     ----------
     model : mujoco.MjModel
+        To be looked at.
     width, height : int
         Of the pictures, in pixels.
     at : (x, y, z)
@@ -65,7 +66,7 @@ class Camera:
         self._camera.azimuth, self._camera.elevation = azimuth, elevation
 
     def picture(self, posture: NDArray[np.float64]) -> Image:
-        """The model in a posture (nq,), as an image (height, width, 3)."""
+        """Render the model in a posture (nq,), as an image (height, width, 3)."""
         self._data.qpos = posture
         import_mujoco().mj_forward(self.model, self._data)
         self._renderer.update_scene(self._data, self._camera)
@@ -83,7 +84,7 @@ class Camera:
 
 
 def _draw_without_display() -> None:
-    """Where nothing else is asked for and there is no display, draw by EGL.
+    """Draw by EGL where nothing else is asked for and there is no display.
 
     MuJoCo reads MUJOCO_GL when it is first imported, which is long ago by now.
     """

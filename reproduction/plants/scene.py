@@ -24,21 +24,30 @@ BOXES = 2
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Where table, ball and barrier are. The paper gives only the ball's size; the rest is our choice.
+    """Places of table, ball and barrier, all in metres.
 
-    Attributes
+    The paper gives only the ball's size; the rest is our choice.
+
+    Parameters
     ----------
     origin : array (3,)
         Midway between the hands in the robot's home posture; the offsets below count from there.
-    floor : height of the floor the table stands on.
-    ball : offsets of the ball's middle.
-    palm : from the ball's surface to a hand's point when it grasps.
-    table_edge : offset along x of the table's near edge; its top is under the ball.
-    barrier_x, thickness, span, height : of the barrier on the table.
-    central_width : of the barrier never trained on, which stands in the middle, without a gap.
-    margin : height over the table, and distance to a barrier over the clearance, that a start leaves.
-
-    All in metres.
+    floor : float
+        Height of the floor the table stands on.
+    ball : (float, float, float)
+        Offsets of the ball's middle.
+    palm : float
+        From the ball's surface to a hand's point when it grasps.
+    table_edge : float
+        Offset along x of the table's near edge; its top is under the ball.
+    barrier_x : float
+        Offset along x of the barrier on the table.
+    thickness, span, height : float
+        Extents of the barrier along x, y and z.
+    central_width : float
+        Of the barrier never trained on, which stands in the middle, without a gap.
+    margin : float
+        Height over the table, and distance to a barrier over the clearance, that a start leaves.
     """
 
     origin: Array
@@ -55,7 +64,7 @@ class Scene:
 
     @property
     def ball_centre(self) -> Array:
-        """(3,), in the world."""
+        """The ball's middle (3,) in the world."""
         return self.origin + self.ball
 
     @property
@@ -65,26 +74,26 @@ class Scene:
 
     @property
     def grasp(self) -> Array:
-        """x_c (6,): a hand on either side of the ball."""
+        """Where the hands grasp, x_c (6,): one on either side of the ball."""
         aside = np.array([0.0, BALL_DIAMETER / 2 + self.palm, 0.0])
         return np.concatenate([self.ball_centre + aside, self.ball_centre - aside])
 
     def with_gap(self, widths: ArrayLike, centre: float = 0.0) -> Barrier:
-        """Barriers with gaps of the given widths (S,), in metres, moved aside by `centre`."""
-        return barrier.with_gap(
+        """Make barriers with gaps of the given widths (S,), in metres, moved aside by `centre`."""
+        return barrier.make_with_gap(
             widths, self.origin[0] + self.barrier_x, self.table_top,
             thickness=self.thickness, span=self.span, height=self.height, centre=centre,
         )  # fmt: skip
 
     def central(self, n: int) -> Barrier:
-        """The unseen barrier, placed centrally between robot and ball, for n movements."""
-        return barrier.central(
+        """Make the unseen barrier, placed centrally between robot and ball, for n movements."""
+        return barrier.make_central(
             n, self.origin[0] + self.barrier_x, self.table_top,
             thickness=self.thickness, width=self.central_width, height=self.height,
         )  # fmt: skip
 
     def admits(self, hands: Array) -> bool:
-        """Whether hands (2, 3) may start here: before any barrier, above the table, each on its own side."""
+        """Tell whether hands (2, 3) may start here: before any barrier, above the table, each on its own side."""
         before = self.origin[0] + self.barrier_x - self.thickness / 2 - CLEARANCE - self.margin
         above = self.table_top + self.margin
         return bool(

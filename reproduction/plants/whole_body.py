@@ -8,6 +8,7 @@ Every step solves one quadratic program over the velocities of all joints,
 with mink's frame tasks, posture task and configuration limit, and the solver DAQP.
 """
 
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ SETTLING_STEPS = 12
 """Steps in which a posture is brought to stand on its feet."""
 
 
-def controller() -> Any:
-    """The package `mink`, imported when first needed. Raises `UnconstrainError` where it is not installed."""
+def import_mink() -> ModuleType:
+    """Import the package `mink` and its solver. Raises `UnconstrainError` where they are not installed."""
     try:
         import mink
         import qpsolvers
@@ -64,8 +65,9 @@ class WholeBody:
     Parameters
     ----------
     humanoid : Humanoid
+        To be moved.
     model : mujoco.MjModel, optional
-        To share with a scene that shows it: what `floating` compiles to, with things added around the robot.
+        To share with a scene that shows it: what `make_floating` compiles to, with things added around the robot.
 
     Attributes
     ----------
@@ -74,9 +76,9 @@ class WholeBody:
     """
 
     def __init__(self, humanoid: Humanoid, model: Any = None):
-        mink = controller()
+        mink = import_mink()
         self.humanoid = humanoid
-        self.model = floating(humanoid).compile() if model is None else model
+        self.model = make_floating(humanoid).compile() if model is None else model
         self._configuration = mink.Configuration(self.model)
         self.data = self._configuration.data
         self._joints = [int(self.model.joint(name).qposadr[0]) for name in humanoid.robot.joints]
@@ -114,7 +116,7 @@ class WholeBody:
         The feet are where they are at home, the centre of mass stays above the same point, and every joint is as
         near to q as these allow. The posture reached is the one the body returns to when the hands leave it free.
         """
-        mink = controller()
+        mink = import_mink()
         wanted = self._upright.copy()
         wanted[self._joints] = q
         self._configuration.update(wanted)
@@ -128,12 +130,22 @@ class WholeBody:
         self._posture.set_target(self._configuration.q)
 
     def move(self, velocities: Array, dt: float) -> Array:
-        """Move the hands with velocities (2, 3) in m/s, as far as the body can, for dt seconds.
+        """Move the hands with the velocities asked for, as far as the body can.
 
-        Returns the velocities (2, 3) the hands really had when the motion began, J q̇. A gap between these and what was
-        asked for is the tracking error of whole-body control.
+        Parameters
+        ----------
+        velocities : array (2, 3)
+            In m/s, left hand first.
+        dt : float
+            For how many seconds.
+
+        Returns
+        -------
+        array (2, 3)
+            The velocities the hands really had when the motion began, J q̇. Their difference from those asked for is
+            the tracking error of whole-body control.
         """
-        mink = controller()
+        mink = import_mink()
         self._posture.gain = POSTURE_RATE * dt
         jacobians = []
         for name, task, velocity in zip(self.humanoid.hands, self._hands, velocities, strict=True):
@@ -146,7 +158,7 @@ class WholeBody:
         return np.stack([jacobian @ qdot for jacobian in jacobians])
 
     def _solve(self, tasks: list[Any], dt: float) -> Array:
-        mink = controller()
+        mink = import_mink()
         try:
             qdot = mink.solve_ik(
                 self._configuration, tasks, dt, "daqp", DAMPING, limits=self._limits, constraints=self._feet
@@ -178,8 +190,8 @@ class WholeBody:
         return "body" if frame in bodies else "site"
 
 
-def floating(humanoid: Humanoid) -> Any:
-    """A copy of the robot's `mujoco.MjSpec`, its pelvis free to move where it has feet to stand on."""
+def make_floating(humanoid: Humanoid) -> Any:
+    """Copy the robot's `mujoco.MjSpec`, its pelvis free to move where it has feet to stand on."""
     spec = humanoid.robot.spec.copy()
     for key in list(spec.keys):  # postures without the pelvis' place in them
         spec.delete(key)

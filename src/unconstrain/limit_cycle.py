@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain.constraints.nullspace import projection, unconstrained
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.simulation import check_memory, simulate
+from unconstrain.simulation import check_size, simulate
 
 SEGMENTS = 3
 """Constraints per trajectory: the first, and two redraws at regular intervals."""
@@ -93,7 +93,7 @@ def demonstrate(
         )
     if not (np.isfinite(noise) and noise >= 0):
         raise UnconstrainError(f"the noise is a share of the actions' scale, 0 or more, not {noise}")
-    check_memory(n_episodes, length, 2, 2, constrained=True)
+    check_size(n_episodes, length, 2, 2, constrained=True)
     rng = np.random.default_rng(random_state)
     policy = policy or LimitCycle()
 

@@ -4,7 +4,6 @@
 places for plants that are more than that: what projects the policy's action, and how the plant moves on.
 """
 
-import os
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain.constraints.nullspace import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
+from unconstrain.memory import check_memory
 
 Array = NDArray[np.float64]
 
@@ -179,7 +179,7 @@ def simulate(
             u = wanted if N is None else np.einsum("sij,sj->si", N, wanted)
             if k == 0:
                 (S, n), d = x.shape, wanted.shape[1]
-                check_memory(S, samples, n, d, constrained=N is not None)
+                check_size(S, samples, n, d, constrained=N is not None)
                 states, policies, actions = (np.empty((S, samples, width)) for width in (n, d, d))
                 projections = None if N is None else np.empty((S, samples, d, d))
             if advance is None:
@@ -214,30 +214,34 @@ def simulate(
     )
 
 
-def check_memory(starts: int, samples: int, n: int, d: int, *, constrained: bool) -> None:
+def check_size(starts: int, samples: int, n: int, d: int, *, constrained: bool) -> None:
     """Refuse movements that would not fit into memory, before anything is allocated.
 
     Parameters
     ----------
-    starts, samples : int
-        Number of movements, and of samples in each.
-    n, d : int
-        Dimensions of states and actions.
+    starts : int
+        Number of movements.
+    samples : int
+        Number of samples in each.
+    n : int
+        Dimension of the states.
+    d : int
+        Dimension of the actions.
     constrained : bool
         Whether there is a projection (d, d) per sample.
 
     Raises
     ------
-    UnconstrainError
-        If the samples would take more than half of this computer's memory.
+    DataError
+        If there is not as much memory as the samples would take.
     """
-    needed = 8 * starts * samples * (n + 2 * d + 2 + constrained * d * d)
-    available = _memory() // 2
-    if needed > available:
-        raise UnconstrainError(
-            f"{_count(samples, 'sample')} from {_count(starts, 'start')} would take {needed / 1e9:,.1f} GB, more than "
-            f"half of this computer's memory ({available / 1e9:,.1f} GB): take fewer steps or fewer starts at a time"
-        )
+    # States, policy, actions, time, episode; checking and flattening need some of them twice.
+    needed = 2.0 * 8 * starts * samples * (n + 2 * d + 2 + constrained * d * d)
+    check_memory(
+        needed,
+        f"a simulation of {_count(samples, 'sample')} from {_count(starts, 'start')}",
+        "take fewer steps or fewer starts at a time",
+    )
 
 
 def _whole(steps: Any) -> int:
@@ -275,14 +279,6 @@ def _checked_start(start: ArrayLike, expected: int | None) -> Array:
             f"the start has NaN or infinity in dimension {column} of start {row}; give finite numbers"
         )
     return x
-
-
-def _memory() -> int:
-    """Ask the system for this computer's memory in bytes; assume 8 GB if it does not say."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return 8 * 10**9
 
 
 def _actions(predict: Callable[[Array], ArrayLike], x: Array) -> Array:

@@ -5,11 +5,11 @@ from functools import partial
 
 import numpy as np
 import pytest
+from reproduction.arm_trials import CONSTRAINTS, POWERS, Recordings, row
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from reproduction import arm, arm_tables, arm_trials, published
-from reproduction.arm_trials import CONSTRAINTS, POWERS, Recordings, row
 from unconstrain.errors import UnconstrainError
 
 QUIET = Console(quiet=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reproduction.robots import OUR_OWN, RobotChoice
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
@@ -13,7 +14,6 @@ import unconstrain as uc
 from reproduction import grasp, grasp_figures, grasp_video, grasp_viewer, posture, published
 from reproduction.plants.grasping import Attractor, Demonstrator, constrain
 from reproduction.plants.rendering import NoOpenGL
-from reproduction.robots import OUR_OWN, RobotChoice
 from unconstrain import metrics as risk
 
 pytest.importorskip("mujoco")

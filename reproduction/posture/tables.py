@@ -1,0 +1,34 @@
+"""The posture's results as Markdown, and what is to be said about them."""
+
+from typing import Any
+
+import numpy as np
+
+from reproduction import markdown, published
+from reproduction.posture.trial import RISKS, collect
+
+
+def write_table(results: list[dict[str, Any]]) -> str:
+    """Write the errors by risk: published | ours."""
+    rows = []
+    for risk in RISKS:
+        mean, deviation = published.POSTURE_NUPE[risk]
+        ours = [markdown.mean_and_deviation(collect(results, risk, error)) for error in ("nUPE", "nCPE")]
+        rows.append([risk, f"{mean:.5f} ± {deviation:.5f}", *ours])
+    table = markdown.table(["risk", "nUPE published", "nUPE ours", "nCPE ours"], rows)
+    return f"{table}\n\nMean ± standard deviation over {len(results)} data sets.\n"
+
+
+def list_findings(results: list[dict[str, Any]], n: int) -> tuple[str, ...]:
+    """Compare the errors over n joints with the published ones, and say how often the wall was met."""
+    ours, direct = (collect(results, risk, "nUPE").mean() for risk in RISKS)
+    met, share = (
+        100 * np.mean([result[fact] for result in results])
+        for fact in ("movements that meet the wall", "samples the wall blocks")
+    )
+    return (
+        f"Mean nUPE {ours:.2g} with {n * (n + 1)} parameters (published "
+        f"{published.POSTURE_NUPE['inconsistency'][0]:g}); direct regression {direct:.2g}, "
+        f"{direct / ours:.0f} times that.",
+        f"{met:.0f} % of the movements meet the wall; it blocks a hand at {share:.0f} % of the samples.",
+    )

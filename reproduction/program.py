@@ -1,0 +1,226 @@
+"""The program: a command an experiment, each with its own options."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from reproduction.experiments import EXPERIMENTS, find_experiment
+from unconstrain.cli import reporting
+from unconstrain.cli.command import Command, Group, Interrupted
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+FOLDER = Path("out") / "reproduction"
+"""Where results go, a folder an experiment."""
+
+PATH = click.Path(path_type=Path)
+COUNT = click.IntRange(min=1)
+
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
+
+RUNNING = (
+    click.option(
+        "--trials", "--datasets", "trials", type=COUNT, help="How many data sets; by default as published."
+    ),
+    click.option("--jobs", type=COUNT, default=os.cpu_count() or 1, show_default=True, help="Processes."),
+)
+OUT = click.option(
+    "--out",
+    type=PATH,
+    help=f"Folder for results, by default {FOLDER}/EXPERIMENT. Finished trials are kept there, and the same command "
+    "goes on from them.",
+)
+ROBOT = (
+    click.option("--robot", type=PATH, help="Your robot, MJCF or URDF; by default our humanoid."),
+    click.option("--lock", default="", help="Joints of it to hold still, by commas."),
+    click.option("--hands", default="", help="Its hand frames, LEFT,RIGHT."),
+)
+FEET = click.option(
+    "--feet", default="", help="Its foot bodies, LEFT,RIGHT; without them its base stands still."
+)
+RECORDINGS = click.option(
+    "--recordings",
+    type=PATH,
+    metavar="FOLDER",
+    help="Folder of the recorded surfaces; without it that part is left out.",
+)
+
+
+@click.group(cls=Group, context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]})
+def program() -> None:
+    """Run the paper's experiments, and those that go beyond it."""
+
+
+def _experiment(name: str, *options: Decorator) -> None:
+    """Add the command of an experiment, whose `reproduce` takes the options."""
+
+    def run_experiment(out: Path | None, **given: Any) -> None:
+        console = _console()
+        outcome = find_experiment(name)(out or FOLDER / name, console=console, **given)
+        from rich.markdown import Markdown
+
+        console.print(Markdown(f"## {outcome.title}\n\n{outcome.table}"))
+        for heading, sentences in (
+            ("found", outcome.findings),
+            ("chosen where the paper is silent", outcome.choices),
+        ):
+            if sentences:
+                console.print(f"{heading}:")
+            for sentence in sentences:
+                console.print(f"  - {sentence}")
+        for path in (*outcome.figures, *outcome.files):
+            console.print(f"written: {path}", soft_wrap=True)
+
+    for option in reversed([*options, OUT]):
+        run_experiment = option(run_experiment)
+    help_ = EXPERIMENTS[name]
+    program.add_command(click.command(name, cls=Command, help=help_, short_help=help_)(run_experiment))
+
+
+_experiment("toy", *RUNNING)
+_experiment(
+    "finger",
+    click.option(
+        "--movements",
+        type=click.IntRange(min=2),
+        default=12,
+        show_default=True,
+        help="Constrained movements to learn from.",
+    ),
+)
+_experiment(
+    "arm",
+    *RUNNING,
+    click.option(
+        "--model",
+        type=click.Choice(["published", "auto"]),
+        default="published",
+        show_default=True,
+        help="auto: the model is chosen by inconsistency.",
+    ),
+    click.option(
+        "--constraint",
+        help="Task rows 1-2-3, a plane's normal 0,0,1, or a matrix; by default the published four.",
+    ),
+    click.option("--physics", is_flag=True, help="With simulated dynamics and contact."),
+)
+_experiment(
+    "grasp",
+    *RUNNING,
+    click.option(
+        "--model",
+        type=click.Choice(["local", "potential", "auto"]),
+        default="local",
+        show_default=True,
+        help="auto: the model is chosen by inconsistency.",
+    ),
+    *ROBOT,
+    FEET,
+    click.option("--video", type=PATH, help="Also render a video, .mp4."),
+)
+_experiment("posture", *RUNNING, *ROBOT)
+_experiment("constraints", *RUNNING, RECORDINGS)
+_experiment("identifiability", *RUNNING, RECORDINGS)
+
+
+def _add_options(*options: Decorator) -> Decorator:
+    def add(function: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add
+
+
+@click.command("all", cls=Command)
+@_add_options(*RUNNING, RECORDINGS)
+@click.option("--out", type=PATH, default=FOLDER, show_default=True, help="Folder, a folder an experiment.")
+def run_all(trials: int | None, jobs: int, recordings: Path | None, out: Path) -> None:
+    """All of them, and a page about them."""
+    from reproduction.report import reproduce_all
+
+    console = _console()
+    page = reproduce_all(out, trials=trials, jobs=jobs, console=console, recordings=recordings)
+    console.print(f"\nreport: {page}", soft_wrap=True)
+
+
+@click.command("view", cls=Command)
+@click.option(
+    "--policy",
+    type=PATH,
+    help="A saved policy over both hands' positions; without it one is learnt first.",
+)
+@click.option(
+    "--movements",
+    type=click.IntRange(min=5),
+    default=100,
+    show_default=True,
+    help="Constrained movements to learn from.",
+)
+@_add_options(*ROBOT, FEET)
+def view(policy: Path | None, movements: int, robot: Path | None, lock: str, hands: str, feet: str) -> None:
+    """Watch the grasp in MuJoCo's viewer, and stand in its way."""
+    from reproduction.grasp import viewer
+    from reproduction.grasp.trial import learn, make_demonstrator, record_training
+    from reproduction.plants.robot_choice import RobotChoice
+    from unconstrain.policies import load_policy
+
+    console = _console()
+    viewer.check_display()
+    learnt = None if policy is None else load_policy(policy)
+    demonstrator = make_demonstrator(RobotChoice.parse(robot, lock, hands, feet))
+    if learnt is None:
+        with console.status(f"learning from {movements} constrained movements"):
+            recording, _ = record_training(demonstrator, 0, movements)
+            learnt, _ = learn(recording.demonstrations, "inconsistency")
+    console.print(viewer.HELP)
+    viewer.view(demonstrator, learnt)
+
+
+program.add_command(run_all)
+program.add_command(view)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the program with the arguments given, or those of the process.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What follows the program's name.
+
+    Returns
+    -------
+    int
+        The exit code: 0, or 2 after a user's mistake, of which one sentence is printed to standard error.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The user pressed Ctrl-C.
+    """
+    try:
+        return program.main(arguments, prog_name="python -m reproduction", standalone_mode=False) or 0
+    except (Interrupted, click.Abort):
+        raise KeyboardInterrupt from None
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 0
+    except click.UsageError as error:
+        hint = None if error.ctx is None else f"see {error.ctx.command_path} --help"
+        reporting.say_error(error.format_message(), hint)
+        return error.exit_code
+    except click.ClickException as error:
+        reporting.say_error(error.format_message())
+        return error.exit_code
+
+
+def _console() -> "Console":
+    """Make a console that takes text literally: brackets in names of files are no markup."""
+    from rich.console import Console
+
+    return Console(markup=False, highlight=False)

@@ -1,0 +1,1 @@
+"""A limit cycle in the plane (section 4.1): Figs. 3 and 4."""

@@ -55,6 +55,15 @@ def program() -> None:
     """Run the paper's experiments, and those that go beyond it."""
 
 
+def _add_options(*options: Decorator) -> Decorator:
+    def add(function: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add
+
+
 def _experiment(name: str, *options: Decorator) -> None:
     """Add the command of an experiment, whose `reproduce` takes the options."""
 
@@ -75,10 +84,9 @@ def _experiment(name: str, *options: Decorator) -> None:
         for path in (*outcome.figures, *outcome.files):
             console.print(f"written: {path}", soft_wrap=True)
 
-    for option in reversed([*options, OUT]):
-        run_experiment = option(run_experiment)
+    decorated: Callable[..., None] = _add_options(*options, OUT)(run_experiment)
     help_ = EXPERIMENTS[name]
-    program.add_command(click.command(name, cls=Command, help=help_, short_help=help_)(run_experiment))
+    program.add_command(click.command(name, cls=Command, help=help_, short_help=help_)(decorated))
 
 
 _experiment("toy", *RUNNING)
@@ -125,15 +133,6 @@ _experiment(
 _experiment("posture", *RUNNING, *ROBOT)
 _experiment("constraints", *RUNNING, RECORDINGS)
 _experiment("identifiability", *RUNNING, RECORDINGS)
-
-
-def _add_options(*options: Decorator) -> Decorator:
-    def add(function: Callable[..., None]) -> Callable[..., None]:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return add
 
 
 @click.command("all", cls=Command)

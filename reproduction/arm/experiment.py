@@ -84,8 +84,8 @@ def reproduce(
     if physics:
         if constraint is not None or model != "published":
             raise UnconstrainError(
-                "in physics the hand is gripped or on a table, and all models are compared: leave out constraint and "
-                "model"
+                "in physics the hand is gripped or on a table, and all models are compared: leave out constraint= "
+                "and model="
             )
         from reproduction.arm.physics import experiment
 

@@ -1,21 +1,13 @@
 """Learnt constraints: exact where the model holds the truth, and honest where there is none to be found."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rich.console import Console
 from sklearn.base import clone
 
 import unconstrain as uc
-from reproduction import constraints, constraints_surfaces, constraints_trials
 from reproduction.plants import arm
-from reproduction.plants.planar import PlanarArm
-from unconstrain.constraints.learnt.base import held_out_projections
-
-RECORDINGS = Path(__file__).parents[2] / "../shared/data"
 
 
 def constrained(A, Pi):
@@ -248,48 +240,3 @@ def test_mistakes_on_the_command_line_are_one_sentence(run, table, tmp_path, arg
     assert sentence in err
     assert "Traceback" not in err
     assert not list(tmp_path.glob("*.skops"))
-
-
-def test_planar_arms_move_as_their_jacobian_says():
-    rng = np.random.default_rng(8)
-    plant, Q, dQ = PlanarArm((1.0, 0.7, 0.4)), rng.uniform(-2, 2, (20, 3)), 1e-6 * rng.normal(size=(20, 3))
-    moved = plant.pose(Q + dQ) - plant.pose(Q - dQ)
-    np.testing.assert_allclose(np.einsum("nij,nj->ni", plant.jacobian(Q), 2 * dQ), moved, atol=1e-14)
-
-
-def test_the_experiment_finds_every_constraint_it_can_hold_without_noise():
-    for name, setting in constraints_trials.settings(0).items():
-        D = setting.record()
-        found = setting.estimator.fit(D.states, D.actions, groups=D.episodes)
-        assert nppe(D.policy, D.projections, found.predict(D.states)) < 1e-20, name
-
-
-def test_without_the_extra_the_experiment_says_what_it_left_out(tmp_path, monkeypatch):
-    def missing():
-        raise uc.errors.UnconstrainError("robots are simulated by MuJoCo, which is not here")
-
-    monkeypatch.setattr(constraints, "import_mujoco", missing)
-    outcome = constraints.reproduce(tmp_path, trials=1, console=Console(quiet=True), data=tmp_path)
-    assert (
-        "Measured constraints are left out: robots are simulated by MuJoCo, which is not here."
-        in outcome.findings
-    )
-    assert outcome.findings[-1].startswith("The recorded surfaces are left out")
-
-
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recorded surfaces are not here")
-def test_the_recorded_surfaces_are_found():
-    flat, curved = constraints_surfaces.recordings(RECORDINGS)
-    constant = uc.ConstantConstraint().fit(flat.states, flat.actions, groups=flat.blocks(10))
-    assert constant.n_constraints_ == 1
-    plane = np.linalg.svd(flat.states - flat.states.mean(axis=0), full_matrices=False)[2][-1]
-    angle = np.degrees(np.arccos(abs(plane @ constant.rows_[0])))
-    assert angle < 3 * np.degrees(constant.uncertainty_)
-    errors = [
-        uc.metrics.projected_observation_error(
-            curved.actions,
-            held_out_projections(each, curved.states, curved.actions, curved.blocks(10)),
-        )
-        for each in (uc.ConstantConstraint(1), uc.FeatureConstraint(uc.NormalizedRBF(5)))
-    ]
-    assert errors[1] < errors[0] / 4

@@ -121,7 +121,7 @@ def test_normals_alone_and_through_a_jacobian():
 
 
 def test_jacobian_rows_flags_and_the_first_known():
-    Q = arm.starts(6, random_state=0)
+    Q = arm.draw_starts(6, random_state=0)
     J = arm.jacobian(Q)
     expected = arm.demonstrate("1-3-5", n_episodes=6, length=1, random_state=0).projections
     np.testing.assert_allclose(constraints.from_jacobian(J, [0, 2, 4]), expected, atol=1e-12)

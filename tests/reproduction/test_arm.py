@@ -5,11 +5,12 @@ from functools import partial
 
 import numpy as np
 import pytest
-from reproduction.arm_trials import CONSTRAINTS, POWERS, Recordings, row
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
-from reproduction import arm, arm_tables, arm_trials, published
+from reproduction import published
+from reproduction.arm import experiment, tables, trial
+from reproduction.arm.trial import CONSTRAINTS, POWERS, Recordings, name_row
 from unconstrain.errors import UnconstrainError
 
 QUIET = Console(quiet=True)
@@ -22,11 +23,10 @@ def _one_thread():
         yield
 
 
-@pytest.fixture
-def two_candidates(monkeypatch):
+def _make_two_candidates():
     """The paper's model and one that knows more: enough to choose between, in a second."""
-    few = {name: arm_trials.candidates()[name] for name in ("locally linear", "decoupled, 15 knots")}
-    monkeypatch.setattr(arm_trials, "candidates", lambda: few)
+    everything = trial.make_candidates()
+    return {name: everything[name] for name in ("locally linear", "decoupled, 15 knots")}
 
 
 def test_recordings_are_held_out():
@@ -43,23 +43,25 @@ def test_recordings_are_held_out():
 
 def test_a_linear_policy_is_learnt_to_rounding_from_every_constraint():
     for constraint in CONSTRAINTS:
-        result = arm_trials.published_trial(2.0, constraint, seed=0, episodes=20)
+        result = trial.run_published(2.0, constraint, seed=0, episodes=20)
         assert result["inconsistency nUPE"] < 1e-8
         assert result["inconsistency complementary nCPE"] < 1e-8
         assert result["direct nUPE"] > 0.7
 
 
 def test_one_full_data_set_is_within_the_published_figures():
-    result = arm_trials.published_trial(1.8, "2-4-6", seed=0)
-    for error in arm_tables.ERRORS:
+    result = trial.run_published(1.8, "2-4-6", seed=0)
+    for error in tables.ERRORS:
         mean, spread = published.ARM[1.8, "2-4-6"][error]
         assert result[f"inconsistency {error}"] < mean + 3 * spread
     assert result["oracle nUPE"] < result["inconsistency nUPE"] < result["direct nUPE"]
     assert 40 <= result["local models"] <= 60
 
 
-def test_what_is_chosen_by_inconsistency_beats_the_published_model_tenfold(two_candidates):
-    result = arm_trials.auto_trial(1.5, "4-5-6", seed=0, episodes=40)
+def test_what_is_chosen_by_inconsistency_beats_the_published_model_tenfold(monkeypatch):
+    few = _make_two_candidates()
+    monkeypatch.setattr(trial, "make_candidates", lambda: few)
+    result = trial.run_auto(1.5, "4-5-6", seed=0, episodes=40)
     chosen = result[f"{result['chosen']} nUPE"]
     assert chosen < published.ARM[1.5, "4-5-6"]["nUPE"][0] / 10
     assert chosen < result["locally linear nUPE"] / 10
@@ -67,64 +69,68 @@ def test_what_is_chosen_by_inconsistency_beats_the_published_model_tenfold(two_c
 
 @pytest.mark.parametrize(("model", "powers"), [("published", POWERS), ("auto", POWERS[:2])])
 def test_reproduce_writes_tables_figures_and_trials(tmp_path, monkeypatch, model, powers):
-    trial = partial(_numbers, model)
-    monkeypatch.setattr(arm_trials, "published_rows" if model == "published" else "auto_rows", trial)
-    outcome = arm.reproduce(tmp_path, trials=3, console=QUIET, model=model)
+    fake = partial(_numbers, model)
+    monkeypatch.setattr(trial, "run_published_rows" if model == "published" else "run_auto_rows", fake)
+    outcome = experiment.reproduce(tmp_path, trials=3, console=QUIET, model=model)
     for text in ("64.33 ± 32.03", "1.42 ± 0.31"):
         assert text in outcome.table
     assert all(path.stat().st_size > 1000 for path in outcome.figures)
     (written,) = [path for path in outcome.files if path.suffix == ".json"]
     trials = json.loads(written.read_text())["trials"]
     assert len(trials) == 3
-    assert set(trials[0]) == {row(p, c) for p in powers for c in CONSTRAINTS}
+    assert set(trials[0]) == {name_row(p, c) for p in powers for c in CONSTRAINTS}
     assert outcome.findings
     assert outcome.choices
 
 
 def test_any_constraint_can_be_asked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr(arm_trials, "published_rows", partial(_numbers, "published"))
-    outcome = arm.reproduce(tmp_path, trials=2, console=QUIET, constraint="0,0,1")
+    monkeypatch.setattr(trial, "run_published_rows", partial(_numbers, "published"))
+    outcome = experiment.reproduce(tmp_path, trials=2, console=QUIET, constraint="0,0,1")
     assert "| 1.5 | 0,0,1 | – |" in outcome.table
     assert {path.stem for path in outcome.files} == {"table1_0_0_1"}
     one = [_numbers("auto", ("0,0,1",), seed) for seed in range(2)]
-    assert len(arm_tables.auto_findings(one)) == 1
+    assert len(tables.list_auto_findings(one)) == 1
     with pytest.raises(UnconstrainError, match="no task row 9"):
-        arm.reproduce(tmp_path, trials=2, console=QUIET, constraint="1-9")
-    with pytest.raises(UnconstrainError, match="leave out constraint and model"):
-        arm.reproduce(tmp_path, trials=2, console=QUIET, constraint="1-2-3", physics=True)
+        experiment.reproduce(tmp_path, trials=2, console=QUIET, constraint="1-9")
+    with pytest.raises(UnconstrainError, match="leave out constraint= and model="):
+        experiment.reproduce(tmp_path, trials=2, console=QUIET, constraint="1-2-3", physics=True)
 
 
 def test_a_wrong_choice_is_counted():
     results = [_numbers("auto", CONSTRAINTS, seed) for seed in range(3)]
-    results[1][row(1.5, "1-2-3")]["chosen"] = "RBF"
-    assert "In 1 of 24 data sets another candidate was nearer" in arm_tables.auto_findings(results)[1]
+    results[1][name_row(1.5, "1-2-3")]["chosen"] = "RBF"
+    assert "In 1 of 24 data sets another candidate was nearer" in tables.list_auto_findings(results)[1]
 
 
 def _numbers(model, constraints, seed):
     """Trials' numbers, to write tables of: errors that differ by row and candidate."""
     rng = np.random.default_rng(seed)
-    names = ("inconsistency", "direct", "oracle") if model == "published" else tuple(arm_trials.candidates())
+    names = ("inconsistency", "direct", "oracle") if model == "published" else tuple(trial.make_candidates())
     keys = ("nUPE", "nCPE", "complementary nCPE", "new nUPE", "inconsistency", "seconds")
     scale = dict(zip(names, 10.0 ** np.arange(len(names)), strict=True))
     one = {f"{name} {key}": scale[name] * rng.uniform(0.01, 0.02) for name in names for key in keys}
     one |= {"local models": 50, "alpha": 0.1} if model == "published" else {"chosen": "locally linear"}
     powers = POWERS if model == "published" else POWERS[:2]
-    return {row(p, c): dict(one) for p in powers for c in constraints}
+    return {name_row(p, c): dict(one) for p in powers for c in constraints}
 
 
 def test_an_unknown_model_is_told(tmp_path):
     with pytest.raises(UnconstrainError, match="no model 'best' for the arm: choose published or auto"):
-        arm.reproduce(tmp_path, console=QUIET, model="best")
+        experiment.reproduce(tmp_path, console=QUIET, model="best")
 
 
-def test_physics_is_learnt_as_well(two_candidates):
+def test_physics_is_learnt_as_well(monkeypatch):
     pytest.importorskip("mujoco")
-    from reproduction import arm_physics
+    from reproduction.arm.physics import figures
+    from reproduction.arm.physics import tables as physical
+    from reproduction.arm.physics import trial as physics
 
-    result = arm_physics.trial((arm_physics.TABLE,), seed=0, episodes=10)[arm_physics.TABLE]
+    few = _make_two_candidates()
+    monkeypatch.setattr(physics, "make_candidates", lambda: few)
+    result = physics.run_trial((physics.TABLE,), seed=0, episodes=10)[physics.TABLE]
     assert result["auto nUPE"] < 0.1 < result["direct nUPE"]
     assert result["angle, median"] < 2.0
-    both = [dict.fromkeys(arm_physics.SCENARIOS, result)] * 2
-    text = arm_physics.table(both)
-    assert "hand gripped (1-2-3)" in text
-    assert arm_physics.error_figure(both).axes
+    both = [dict.fromkeys(physical.SCENARIOS, result)] * 2
+    assert "hand gripped (1-2-3)" in physical.write_table(both)
+    assert len(physical.list_findings(both)) == 2
+    assert figures.plot_errors(both).axes

@@ -1,13 +1,11 @@
-"""Experiments: trials that survive an interruption, and small runs of the toy and the finger."""
+"""Trials that survive an interruption."""
 
-import json
 from io import StringIO
 
 import numpy as np
 import pytest
 from rich.console import Console
 
-from reproduction import experiment, finger, toy
 from reproduction.trials import run_trials
 from unconstrain.errors import UnconstrainError
 
@@ -74,29 +72,6 @@ def test_mistakes_are_told_in_a_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(UnconstrainError, match="cannot keep trials"):
         run_trials(drawn, 1, tmp_path / "file" / "kept.jsonl", settings={})
-    with pytest.raises(UnconstrainError, match="no experiment 'toe': choose one of finger, toy"):
-        experiment("toe")
-
-
-def test_toy_in_small(tmp_path):
-    outcome = toy.reproduce(tmp_path, trials=2, console=quiet())
-    for name in ("fig3.png", "fig3.svg", "fig4.png", "fig4.svg", "trials.json", "table.md"):
-        assert (tmp_path / name).stat().st_size > 0
-    assert all(path.is_file() for path in (*outcome.figures, *outcome.files))
-    trials = json.loads((tmp_path / "trials.json").read_text())["trials"]
-    assert len(trials) == 2
-    for trial in trials:
-        ours = trial["inconsistency, 40 trajectories"]
-        assert ours["nUPE"] < 0.0027
-        assert ours["nCPE"] <= ours["nUPE"]
-        assert trial["direct, 40 trajectories"]["nUPE"] > 0.3
-    again = toy.reproduce(tmp_path, trials=2, console=quiet())
-    assert again.table == outcome.table
-
-
-def test_finger(tmp_path):
-    outcome = finger.reproduce(tmp_path, console=quiet())
-    assert {path.name for path in outcome.figures} == {"fig1.png"}
-    errors = json.loads((tmp_path / "errors.json").read_text())
-    assert errors["inconsistency"]["nUPE"] < 1e-6
-    assert errors["direct"]["nUPE"] > 1000 * errors["inconsistency"]["nUPE"]
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(UnconstrainError, match="cannot keep trials"):
+        run_trials(drawn, 1, tmp_path / "folder", settings={})

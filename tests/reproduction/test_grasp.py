@@ -1,4 +1,4 @@
-"""Grasping and posture: small data sets already reach the published figures; pictures, and the viewer's loop."""
+"""Grasping: small data sets already reach the published figures; pictures, and the viewer's loop."""
 
 import importlib.metadata
 import json
@@ -6,15 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reproduction.robots import OUR_OWN, RobotChoice
 from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 import unconstrain as uc
-from reproduction import grasp, grasp_figures, grasp_video, grasp_viewer, posture, published
+from reproduction import published
+from reproduction.grasp import experiment, figures, trial, video, viewer
+from reproduction.plants.barrier import CLEARANCE
 from reproduction.plants.grasping import Attractor, Demonstrator, constrain
+from reproduction.plants.posture import demonstrate
 from reproduction.plants.rendering import NoOpenGL
-from unconstrain import metrics as risk
+from reproduction.plants.robot_choice import OUR_OWN, RobotChoice
 
 pytest.importorskip("mujoco")
 pytest.importorskip("mink")
@@ -28,17 +30,17 @@ def one_thread():
 
 @pytest.fixture(scope="module")
 def demonstrator():
-    return grasp.demonstrator_of(OUR_OWN)
+    return trial.make_demonstrator(OUR_OWN)
 
 
 @pytest.fixture(scope="module")
 def recorded(demonstrator):
-    return grasp.training(demonstrator, 0, n=50, duration=1.0)
+    return trial.record_training(demonstrator, 0, n=50, duration=1.0)
 
 
 @pytest.fixture(scope="module")
 def policies(demonstrator, recorded):
-    learnt = {kind: grasp.learn(recorded[0].demonstrations, kind)[0] for kind in ("inconsistency", "direct")}
+    learnt = {kind: trial.learn(recorded[0].demonstrations, kind)[0] for kind in ("inconsistency", "direct")}
     return {"expert": demonstrator.policy, **learnt}
 
 
@@ -62,18 +64,20 @@ def test_what_is_recorded_is_the_policy_behind_the_barrier(demonstrator, recorde
     assert np.linalg.norm(D.actions - expected) < 2e-3 * np.linalg.norm(expected)
     assert recording.tracking < 2e-3
     assert recording.movements_blocked >= 0.5
-    assert risk.inconsistency(D.actions, D.policy) < 1e-5 * risk.inconsistency(D.actions, 0 * D.policy)
+    assert uc.metrics.inconsistency(D.actions, D.policy) < 1e-5 * uc.metrics.inconsistency(
+        D.actions, 0 * D.policy
+    )
     # No hand gets nearer to its barrier than half the clearance.
     X = D.states.reshape(D.n_episodes, -1, 2, 3)
     for k in range(X.shape[1]):
         for hand in range(2):
-            assert obstacle.nearest(X[:, k, hand])[0].min() > 0.5 * grasp.CLEARANCE
+            assert obstacle.nearest(X[:, k, hand])[0].min() > 0.5 * CLEARANCE
 
 
 def test_fifty_short_movements_reach_table_two(demonstrator, recorded, policies):
-    test = grasp.training(demonstrator, 1, n=8)[0].demonstrations
-    ours = grasp.columns(demonstrator, test, policies["inconsistency"].predict(test.states))
-    direct = grasp.columns(demonstrator, test, policies["direct"].predict(test.states))
+    test = trial.record_training(demonstrator, 1, n=8)[0].demonstrations
+    ours = trial.measure_columns(demonstrator, test, policies["inconsistency"].predict(test.states))
+    direct = trial.measure_columns(demonstrator, test, policies["direct"].predict(test.states))
     assert list(ours) == list(published.GRASP)
     assert ours["training constraints (nCPE)"] <= ours["unconstrained (nUPE)"]
     for column in ours:
@@ -81,12 +85,12 @@ def test_fifty_short_movements_reach_table_two(demonstrator, recorded, policies)
 
 
 def test_potential_features_go_far_below(demonstrator, recorded):
-    policy, name = grasp.learn(recorded[0].demonstrations, "inconsistency", "potential")
-    test = grasp.training(demonstrator, 1, n=4)[0].demonstrations
+    policy, name = trial.learn(recorded[0].demonstrations, "inconsistency", "potential")
+    test = trial.record_training(demonstrator, 1, n=4)[0].demonstrations
     assert name == "potential"
-    assert max(grasp.columns(demonstrator, test, policy.predict(test.states)).values()) < 1e-3
+    assert max(trial.measure_columns(demonstrator, test, policy.predict(test.states)).values()) < 1e-3
     with pytest.raises(uc.errors.UnconstrainError, match="choose local, potential or auto"):
-        grasp.model("inconsistency", "deep")
+        trial.make_model("inconsistency", "deep")
 
 
 def test_the_unseen_barrier_is_in_the_middle(demonstrator):
@@ -111,9 +115,9 @@ def test_grasp_reproduces_and_goes_on_from_kept_trials(tmp_path, monkeypatch, de
     )
     small |= {"inconsistency model": "local", "direct model": "local", "tracking error": 1e-4}
     small |= dict.fromkeys(facts, 0.9)
-    monkeypatch.setattr(grasp, "run_trials", lambda *_, **__: [small])
-    monkeypatch.setattr(grasp, "training", lambda *_: recorded)
-    outcome = grasp.reproduce(tmp_path, trials=1, console=quiet)
+    monkeypatch.setattr(experiment, "run_trials", lambda *_, **__: [small])
+    monkeypatch.setattr(trial, "record_training", lambda *_: recorded)
+    outcome = experiment.reproduce(tmp_path, trials=1, console=quiet)
     assert "0.0056 ± 0.0022 | 0.0010 ± 0.0000 | 400 |" in outcome.table
     for path in (*outcome.figures, *outcome.files):
         assert path.stat().st_size > 0
@@ -121,33 +125,9 @@ def test_grasp_reproduces_and_goes_on_from_kept_trials(tmp_path, monkeypatch, de
 
 
 def test_a_trial_of_the_grasp_in_small(demonstrator):
-    result = grasp.trial(0, n_episodes=10, duration=0.4)
+    result = trial.run_trial(0, n_episodes=10, duration=0.4)
     assert set(published.GRASP) < set(result["direct"])
     json.dumps(result)
-
-
-def test_one_data_set_of_the_posture_reaches_the_published_figure(tmp_path):
-    outcome = posture.reproduce(tmp_path, trials=1, console=Console(quiet=True))
-    result = json.loads((tmp_path / "trials.json").read_text())["trials"][0]
-    assert result["inconsistency"]["nUPE"] <= published.POSTURE_NUPE["inconsistency"][0]
-    assert result["direct"]["nUPE"] > 50 * result["inconsistency"]["nUPE"]
-    assert result["movements that meet the wall"] > 0.9
-    assert "0.00291 ± 0.00313" in outcome.table
-    for path in (*outcome.figures, *outcome.files):
-        assert path.stat().st_size > 0
-
-
-def test_posture_demonstrations_obey_wall_and_limits():
-    humanoid = OUR_OWN.humanoid()
-    D, blocked = posture.demonstrate(humanoid, 4, 40, random_state=0)
-    np.testing.assert_allclose(D.actions, np.einsum("nij,nj->ni", D.projections, D.policy), atol=1e-12)
-    np.testing.assert_allclose(D.projections @ D.projections, D.projections, atol=1e-9)
-    np.testing.assert_allclose(D.policy, -0.1 * (D.states - humanoid.outstretched))
-    low, high = humanoid.robot.limits.T
-    assert ((low <= D.states) & (D.states <= high)).all()
-    assert 0 < blocked.mean() < 1
-    again, _ = posture.demonstrate(humanoid, 4, 40, random_state=0)
-    np.testing.assert_array_equal(D.states, again.states)
 
 
 def test_a_real_robot_by_path_learns_one_short_data_set():
@@ -155,22 +135,22 @@ def test_a_real_robot_by_path_learns_one_short_data_set():
     found = [file for file in files if file.name == "g1_29dof_rev_1_0.urdf"]
     if not found:
         pytest.skip("example-robot-data has no G1")
-    choice = RobotChoice.of(
+    choice = RobotChoice.parse(
         Path(str(found[0].locate())),
         "waist_roll_joint,waist_pitch_joint",
         "left_rubber_hand,right_rubber_hand",
         "left_ankle_roll_link,right_ankle_roll_link",
     )
-    D, _ = posture.demonstrate(choice.humanoid(), 2, 5, random_state=0)
+    D, _ = demonstrate(choice.load(), 2, 5, random_state=0)
     assert D.states.shape == (10, 27)
-    recording, _ = grasp.training(Demonstrator(choice.humanoid()), 0, n=2, duration=0.2)
+    recording, _ = trial.record_training(Demonstrator(choice.load()), 0, n=2, duration=0.2)
     assert recording.tracking < 0.01
     assert recording.demonstrations.actions.any(axis=1).all()
 
 
 def test_pictures_of_the_robot(tmp_path, demonstrator, policies):
     try:
-        frame = next(grasp_video.frames(demonstrator, {"expert": policies["expert"]}))
+        frame = next(video.render_frames(demonstrator, {"expert": policies["expert"]}))
     except NoOpenGL:
         pytest.skip("no OpenGL")
     assert frame.shape == (576, 480, 3)
@@ -178,7 +158,7 @@ def test_pictures_of_the_robot(tmp_path, demonstrator, policies):
     red, green, blue = frame.reshape(-1, 3).astype(int).T
     assert np.count_nonzero((red > 150) & (green < 130) & (blue < 60)) > 200
     with pytest.raises(uc.errors.UnconstrainError, match=r"end the name in \.mp4"):
-        grasp_video.write(tmp_path / "grasp.gif", demonstrator, policies)
+        video.write_video(tmp_path / "grasp.gif", demonstrator, policies)
     assert not list(tmp_path.iterdir())
 
 
@@ -188,17 +168,17 @@ def test_without_opengl_a_sentence_and_the_other_figures(
     def missing(*_, **__):
         raise NoOpenGL("there is no OpenGL to draw with here")
 
-    monkeypatch.setattr(grasp_figures, "Camera", missing)
-    pictures = grasp_figures.write(tmp_path, demonstrator, *recorded, policies)
+    monkeypatch.setattr(figures, "Camera", missing)
+    pictures = figures.write_pictures(tmp_path, demonstrator, *recorded, policies)
     assert [path.name for path in pictures.shown] == ["fig6.png"]
     assert "no OpenGL" in pictures.left_out[0]
 
 
 def test_the_viewer_s_loop_follows_keys(demonstrator, monkeypatch):
-    loop = grasp_viewer.Interaction(demonstrator, demonstrator.policy)
+    loop = viewer.Interaction(demonstrator, demonstrator.policy)
     before = loop.body.hands
-    loop.press(grasp_viewer.UP)
-    loop.press(grasp_viewer.LEFT)
+    loop.press(viewer.UP)
+    loop.press(viewer.LEFT)
     assert loop.width == pytest.approx(0.27)
     assert loop.aside == pytest.approx(0.02)
     loop.step()
@@ -209,6 +189,6 @@ def test_the_viewer_s_loop_follows_keys(demonstrator, monkeypatch):
     loop.step()
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(grasp_viewer.sys, "platform", "linux")
+    monkeypatch.setattr(viewer.sys, "platform", "linux")
     with pytest.raises(uc.errors.UnconstrainError, match="no display"):
-        grasp_viewer.view(demonstrator, demonstrator.policy)
+        viewer.view(demonstrator, demonstrator.policy)

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reproduction.plants.finger import PENETRATION, Box, Finger
+from reproduction.plants.box import Box
+from reproduction.plants.finger import PENETRATION, Finger
 from unconstrain.errors import DataError, UnconstrainError
 
 FINGER = Finger()
@@ -64,8 +65,10 @@ def test_never_inside_and_always_the_projected_policy(box):
     )
     np.testing.assert_allclose(demos.projections @ demos.projections, demos.projections, atol=1e-12)
     for q, u in zip(demos.states, demos.actions, strict=True):
-        touched, rows = FINGER._contacts(q, [box])
-        assert np.all(rows[touched <= 1e-5] @ u >= -1e-9), "the action presses into the obstacle"
+        contacts = FINGER.contacts(q, [box])
+        assert np.all(contacts.rows[contacts.distances <= 1e-5] @ u >= -1e-9), (
+            "the action presses into the obstacle"
+        )
 
 
 def test_the_finger_moves_as_its_actions_say():

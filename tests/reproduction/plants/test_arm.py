@@ -1,4 +1,4 @@
-"""The arm moves as its Denavit–Hartenberg figures say, and its constraints block what their names say."""
+"""The arm moves as its Denavit–Hartenberg figures say, under constraints on its hand."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_jacobian_is_the_derivative_of_the_pose(Q):
 
 def test_mujoco_sees_the_same_arm():
     pytest.importorskip("mujoco")
-    robot, Q = arm.robot(), np.vstack([np.zeros(7), arm.starts(50, 1)])
+    robot, Q = arm.load_robot(), np.vstack([np.zeros(7), arm.draw_starts(50, 1)])
     np.testing.assert_allclose(robot.limits, arm.LIMITS[:, None] * [-1, 1])
     np.testing.assert_allclose(robot.jacobian(Q, arm.HAND), arm.jacobian(Q), atol=1e-13)
     for theirs, ours in zip(robot.pose(Q, arm.HAND), arm.pose(Q), strict=True):
@@ -87,54 +87,13 @@ def test_the_same_seed_gives_the_same_movements():
 
 
 @pytest.mark.parametrize(
-    ("given", "selection"),
-    [
-        ("1-2-3", np.eye(6)[:3]),
-        (" 6-1 ", np.eye(6)[[5, 0]]),
-        ("3", np.eye(6)[[2]]),
-        ("0,0,2", [[0, 0, 1, 0, 0, 0]]),
-        ([3.0, 4.0, 0.0], [[0.6, 0.8, 0, 0, 0, 0]]),
-        ("1,0,0,0,0,0; 0,0,0,0,0,2", [[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 2]]),
-        (np.eye(6)[1:4], np.eye(6)[1:4]),
-    ],
-)
-def test_constraints_as_users_write_them(given, selection):
-    constraint = TaskConstraint.parse(given)
-    np.testing.assert_allclose(constraint.selection, selection)
-    assert TaskConstraint.parse(constraint) is constraint
-
-
-@pytest.mark.parametrize(("one", "other"), [("1-2-3", "4-5-6"), ("1-3-5", "2-4-6"), ("6", "1-2-3-4-5")])
-def test_complements_of_rows(one, other):
-    assert TaskConstraint.parse(one).complement().name == other
-    assert TaskConstraint.parse(other).complement().name == one
-
-
-def test_the_complement_of_a_plane_is_everything_else():
-    plane = TaskConstraint.parse("1,1,0")
-    rest = plane.complement().selection
-    assert rest.shape == (5, 6)
-    np.testing.assert_allclose(rest @ plane.selection.T, 0, atol=1e-15)
-
-
-@pytest.mark.parametrize(
     ("kind", "call", "sentence"),
     [
-        (UnconstrainError, lambda: TaskConstraint.parse("1-2-7"), "no task row 7 as in '1-2-7'"),
-        (UnconstrainError, lambda: TaskConstraint.parse("0-1"), "no task row 0"),
-        (UnconstrainError, lambda: TaskConstraint.parse("1-1"), "named twice"),
-        (UnconstrainError, lambda: TaskConstraint.parse("table"), "'table' is no constraint: give task rows"),
-        (UnconstrainError, lambda: TaskConstraint.parse("1,2"), "is no constraint"),
-        (UnconstrainError, lambda: TaskConstraint.parse("1,2,3; 1,2,3,4,5,6"), "is no constraint"),
-        (UnconstrainError, lambda: TaskConstraint.parse("0,0,0"), "cannot be 0,0,0"),
-        (UnconstrainError, lambda: TaskConstraint.parse("1-2-3-4-5-6").complement(), "leaves nothing free"),
-        (DataError, lambda: TaskConstraint.parse("0,nan,1"), "NaN or infinity"),
-        (DataError, lambda: TaskConstraint.parse(np.eye(4)), "or a matrix \\(k, 6\\), not \\(4, 4\\)"),
-        (DataError, lambda: TaskConstraint.parse([["a"]]), "must be numbers"),
         (DataError, lambda: arm.pose([[0.0] * 6]), "has 7 joints"),
         (DataError, lambda: arm.jacobian([[np.inf] * 7]), "NaN or infinity"),
         (UnconstrainError, lambda: arm.PowerPolicy(1.0), "a power above 1"),
         (UnconstrainError, lambda: arm.demonstrate(length=0), "at least one episode and sample"),
+        (UnconstrainError, lambda: arm.demonstrate(n_episodes=10**10), "would take"),
     ],
 )
 def test_mistakes_are_told_in_a_sentence(kind, call, sentence):

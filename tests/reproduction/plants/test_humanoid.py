@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 import unconstrain as uc
 from reproduction.plants import barrier
-from reproduction.plants.barrier import CLEARANCE, Barrier, Wall, blocking
+from reproduction.plants.barrier import CLEARANCE, Barrier, Wall, find_blocking
 from reproduction.plants.humanoid import Humanoid
 from reproduction.plants.whole_body import WholeBody
 
@@ -47,7 +47,7 @@ def test_our_own_robot_has_27_joints_two_hands_and_plausible_proportions(humanoi
 
 
 def test_hands_and_jacobians_are_those_of_the_robot_and_of_differences(humanoid):
-    Q = humanoid.start_postures(3, np.random.default_rng(0))
+    Q = humanoid.draw_postures(3, np.random.default_rng(0))
     X, J = humanoid.hand_motion(Q)
     for hand, frame in enumerate(humanoid.hands):
         np.testing.assert_allclose(X[:, hand], humanoid.robot.pose(Q, frame)[0], atol=1e-12)
@@ -58,8 +58,8 @@ def test_hands_and_jacobians_are_those_of_the_robot_and_of_differences(humanoid)
     np.testing.assert_allclose(np.moveaxis(ahead - behind, 0, -1) / 2e-6, J[0], atol=1e-8)
 
 
-def test_start_postures_are_within_limits_free_of_contact_and_as_spread_as_asked(humanoid):
-    Q = humanoid.start_postures(200, np.random.default_rng(1))
+def test_draw_postures_are_within_limits_free_of_contact_and_as_spread_as_asked(humanoid):
+    Q = humanoid.draw_postures(200, np.random.default_rng(1))
     assert ((humanoid.robot.limits[:, 0] <= Q) & (humanoid.robot.limits[:, 1] >= Q)).all()
     assert not any(humanoid.touches_itself(q) for q in Q[:20])
     waist = humanoid.robot.joints.index("waist_yaw")
@@ -90,17 +90,17 @@ def test_a_hand_is_blocked_only_when_near_and_led_nearer():
     wall = Wall(np.zeros((1, 3)), np.array([[-1.0, 0.0, 0.0]]))
     hands = np.array([[[-0.5 * CLEARANCE, 0.2, 0.0], [-2 * CLEARANCE, -0.2, 0.0]]])
     towards, away = np.ones((1, 2, 3)), -np.ones((1, 2, 3))
-    rows, blocked = blocking(wall, hands, towards)
+    rows, blocked = find_blocking(wall, hands, towards)
     assert blocked.tolist() == [[True, False]]
     np.testing.assert_allclose(rows[0, 0, 0], [-1, 0, 0])
-    assert not blocking(wall, hands, away)[1].any()
+    assert not find_blocking(wall, hands, away)[1].any()
 
 
 @pytest.mark.parametrize(("width", "open_at"), [(0.25, 0.0), (-0.1, None), (0.0, None)])
 def test_the_gap_is_where_it_should_be(width, open_at):
-    made = barrier.with_gap([width], 0.3, 0.6, thickness=0.02, span=0.9, height=0.3)
+    made = barrier.make_with_gap([width], 0.3, 0.6, thickness=0.02, span=0.9, height=0.3)
     y = np.linspace(-0.4, 0.4, 81)
-    distance, _ = barrier.with_gap(
+    distance, _ = barrier.make_with_gap(
         np.full(81, width), 0.3, 0.6, thickness=0.02, span=0.9, height=0.3
     ).nearest(np.stack([np.full(81, 0.3), y, np.full(81, 0.7)], axis=1))
     free = distance.min(axis=1) > 0
@@ -111,7 +111,7 @@ def test_the_gap_is_where_it_should_be(width, open_at):
 
 def test_the_whole_body_carries_the_hands_and_keeps_its_feet(humanoid):
     body = WholeBody(humanoid)
-    body.stand(humanoid.start_postures(1, np.random.default_rng(3))[0])
+    body.stand(humanoid.draw_postures(1, np.random.default_rng(3))[0])
     feet = [body.data.body(foot).xpos.copy() for foot in humanoid.feet]
     start, v = body.hands, np.array([[0.1, 0.02, 0.05], [0.1, -0.02, 0.03]])
     for _ in range(50):

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from sklearn.base import clone
 
 from reproduction.arm.trial import make_candidates
 from reproduction.constraints.trial import SETTINGS

@@ -98,14 +98,14 @@ class Table:
         return iter(self.rows)
 
     def __getitem__(self, name: str) -> Row:
-        """The row of the candidate of that name."""
+        """Return the row of the candidate of that name."""
         for row in self.rows:
             if row.name == name:
                 return row
         raise KeyError(name)
 
     def __str__(self) -> str:
-        """A Markdown table, its columns aligned."""
+        """Return a Markdown table, its columns aligned."""
         head = ("candidate", self.measure, "explained", "λ", "parameters", "seconds")
         lines = [head, *(_cells(row) for row in self.rows if row.problem is None)]
         widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
@@ -141,7 +141,7 @@ class Selection:
 
 
 def candidates(n: int, d: int) -> dict[str, Policy]:
-    """The candidates of "auto", all with λ chosen by held-out inconsistency.
+    """Return the candidates of "auto", all with λ chosen by held-out inconsistency.
 
     Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
     even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
@@ -187,7 +187,7 @@ def select_policy(
     n_jobs: int | None = None,
     progress: Callable[[Row], None] | None = None,
 ) -> Selection:
-    """The candidate with the least inconsistency on held-out episodes, fitted to all the data.
+    """Return the candidate with the least inconsistency on held-out episodes, fitted to all the data.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def _judge(
 def _hold_out(
     policy: Policy, X: np.ndarray, U: Any, groups: np.ndarray | None, projections: np.ndarray | None
 ) -> tuple[Policy, np.ndarray, np.ndarray]:
-    """The policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
+    """Return the policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
     if policy.alpha != "cv":  # `fit` does not get to see it
         check_number(policy.alpha, "alpha", positive=False)
     fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)

@@ -46,7 +46,7 @@ class Planner:
         self.G = self._stack(policy.model_.moments(candidates, everything).H)
 
     def next(self, k: int, criterion: str) -> list[Recording]:
-        """The k best, one after the other; the planner is left as if they were made."""
+        """Return the k best, one after the other; the planner is left as if they were made."""
         return [self._best(criterion) for _ in range(k)]
 
     def gains(self, X: np.ndarray, directions: np.ndarray, criterion: str = "A") -> np.ndarray:

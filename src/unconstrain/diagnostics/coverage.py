@@ -1,4 +1,4 @@
-"""Which motions were ever seen near a state: the local second moment of observed directions,
+"""Which motions were recorded near a state: the local second moment of recorded directions.
 
     C(x) = Σ_n K_n û_n û_nᵀ / Σ_n K_n,     K_n = exp(-‖x - x_n‖² / 2σ²),     trace C = 1.
 

@@ -52,7 +52,7 @@ def of_recordings(
     sample_weight: ArrayLike | None = None,
     projections: ArrayLike | None = None,
 ) -> tuple[Information, np.ndarray]:
-    """The information in recordings, under a fitted policy's features.
+    """Return the information in recordings, under a fitted policy's features.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def of_recordings(
 
 
 def of_fit(policy: Policy) -> Information:
-    """The information in all that a fitted policy has learnt from, by its moments alone.
+    """Return the information in all that a fitted policy has learnt from, by its moments alone.
 
     Parameters
     ----------

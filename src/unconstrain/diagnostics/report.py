@@ -135,7 +135,7 @@ class Identifiability:
         return self.determined_shares(self.threshold)
 
     def determined_shares(self, thresholds):
-        """The same at any thresholds, an array of their shape or a number: the spectrum as a curve."""
+        """Return the share for each of several thresholds, in an array of their shape: the spectrum as a curve."""
         values = self.spectrum
         shares = 1.0 - np.searchsorted(values, thresholds) / max(len(values), 1)
         return float(shares) if np.ndim(shares) == 0 else shares
@@ -199,7 +199,7 @@ class Identifiability:
         return spread * len(X) ** (-1.0 / (X.shape[1] + 4)) or 1.0
 
     def worst_regions(self, k: int = 3) -> list[Region]:
-        """The k recorded states, apart from each other, where the policy is known least, the worst first.
+        """Return the k recorded states, apart from each other, where the policy is known least, the worst first.
 
         Ordered by the posterior's largest standard deviation. The direction is that of the motion least seen there.
         """
@@ -223,7 +223,7 @@ class Identifiability:
     def next_recordings(
         self, k: int = 3, *, candidates=None, criterion: str = "A", length=None
     ) -> list[Recording]:
-        """The k recordings to make next, the most telling first: see `advice`.
+        """Return the k recordings to make next, the most telling first: see `advice`.
 
         candidates: states (C, n) where one could begin, and where the policy matters; by default recorded ones.
         criterion: "A", to lessen the expected error over the candidates, or "D", to lessen the entropy.
@@ -285,7 +285,7 @@ class Identifiability:
         return "\n".join(lines)
 
     def describe(self, state_names: Sequence[str], action_names: Sequence[str], k: int = 3) -> str:
-        """The report in sentences, with the user's own names of states and actions."""
+        """Return the report in sentences, with the user's own names of states and actions."""
         return described(self, state_names, action_names, k)
 
     @property
@@ -314,14 +314,14 @@ class Identifiability:
         return float(np.sum(seen.squares) / np.sum(seen.weight))
 
     def recordings_for(self, what: str) -> Recordings:
-        """The recordings that are needed to say `what`. Raises `DataError` for a report of moments alone."""
+        """Return the recordings that are needed to say `what`. Raises `DataError` for a report of moments alone."""
         if self.recordings is None:
             raise DataError(f"to say {what}, the recordings are needed: identifiability(policy, X, U)")
         return self.recordings
 
 
 def _oriented(direction: np.ndarray) -> np.ndarray:
-    """A line has no sign: its largest part is shown positive."""
+    """Turn a line, which has no sign, so that its largest part is positive."""
     return direction * (np.sign(direction[np.argmax(np.abs(direction))]) or 1.0)
 
 

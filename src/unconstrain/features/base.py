@@ -50,7 +50,7 @@ class Features(Protocol):
         ...
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """The features seen along one direction at each state.
+        """Return the features along one direction at each state.
 
         Parameters
         ----------
@@ -67,7 +67,7 @@ class Features(Protocol):
         ...
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy itself.
+        """Return the actions of the policy.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class FullBasis(Features, Protocol):
     """A feature map whose policy is `π(x) = W b(x)`, W (d, M) free, with parameters in the order of W's rows."""
 
     def basis(self, X: np.ndarray) -> np.ndarray:
-        """The basis that all actions share.
+        """Return the basis that all actions share.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Compilable(Protocol):
     """A feature map that can be compiled for a control loop."""
 
     def compile(self, w: np.ndarray) -> "CompiledPolicy":
-        """The policy with these parameters, as arrays.
+        """Return the policy with these parameters, as arrays.
 
         Parameters
         ----------
@@ -142,7 +142,7 @@ def is_feature_map(candidate: object) -> bool:
 
 
 def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> Features:
-    """A copy of a feature map, fitted.
+    """Return a copy of a feature map, fitted.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray
 
 
 def fit_transformer(transformer: Any, X: np.ndarray, sample_weight: np.ndarray | None = None) -> Any:
-    """A copy of a scikit-learn transformer, fitted.
+    """Return a copy of a scikit-learn transformer, fitted.
 
     Parameters
     ----------

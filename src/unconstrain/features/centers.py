@@ -60,7 +60,7 @@ def place(
 
 
 def grid(X: np.ndarray, n_centers: int) -> np.ndarray:
-    """A regular grid over the data's range: k centres per dimension, k the largest with `k^n <= n_centers`."""
+    """Return a regular grid over the data's range: k centres per dimension, k the largest with `k^n <= n_centers`."""
     n = X.shape[1]
     per_axis = max(1, int(np.floor(n_centers ** (1.0 / n) + 1e-9)))
     low, high = X.min(axis=0), X.max(axis=0)

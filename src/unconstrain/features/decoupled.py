@@ -115,7 +115,7 @@ class DecoupledFeatures(BaseEstimator):
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """The features seen along one direction at each state.
+        """Return the features along one direction at each state.
 
         Parameters
         ----------
@@ -133,7 +133,7 @@ class DecoupledFeatures(BaseEstimator):
         return V.reshape(len(X), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy itself.
+        """Return the actions of the policy.
 
         Parameters
         ----------

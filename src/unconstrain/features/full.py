@@ -70,7 +70,7 @@ class FullFeatures(BaseEstimator):
         return self
 
     def basis(self, X: np.ndarray) -> np.ndarray:
-        """The basis that all actions share.
+        """Return the basis that all actions share.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class FullFeatures(BaseEstimator):
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """The features seen along one direction at each state.
+        """Return the features along one direction at each state.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class FullFeatures(BaseEstimator):
         return (directions[:, :, None] * self.basis(X)[:, None, :]).reshape(len(X), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy itself.
+        """Return the actions of the policy.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class FullFeatures(BaseEstimator):
 
 
 def as_features(given: Any) -> Features:
-    """The feature map that an argument `features=` stands for, not fitted yet.
+    """Return the feature map that an argument `features=` stands for, not fitted yet.
 
     Parameters
     ----------

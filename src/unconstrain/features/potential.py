@@ -78,7 +78,7 @@ class PotentialFeatures(BaseEstimator):
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """The features seen along one direction at each state.
+        """Return the features along one direction at each state.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class PotentialFeatures(BaseEstimator):
         return np.negative(V, out=V)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy itself.
+        """Return the actions of the policy.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class PotentialFeatures(BaseEstimator):
         return actions
 
     def potential(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The potential, up to a constant.
+        """Return the potential, up to a constant.
 
         Parameters
         ----------

@@ -99,7 +99,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         return self
 
     def transform(self, X: ArrayLike) -> np.ndarray:
-        """The basis functions at states, finite however far a state is from all centres.
+        """Return the basis functions at states, finite however far a state is from all centres.
 
         Parameters
         ----------

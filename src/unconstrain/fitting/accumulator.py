@@ -106,7 +106,7 @@ class Accumulator:
         self.include(self.sums(samples, self.deal(samples)))
 
     def deal(self, samples: Samples) -> np.ndarray | None:
-        """The fold of each sample, (N,); new episodes are dealt out. None where λ is a number.
+        """Return the fold of each sample, (N,); new episodes are dealt out. None where λ is a number.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Accumulator:
         return None if self.folds is None else self.folds.assign(samples.groups, len(samples.states))
 
     def sums(self, samples: Samples, fold: np.ndarray | None = None) -> Sums:
-        """What samples add. Changes nothing, so threads may call it side by side.
+        """Return what samples add. Changes nothing, so threads may call it side by side.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class Accumulator:
         self.include(sums)
 
     def empty(self, known_folds: dict | None = None, longest: float | None = None) -> "Accumulator":
-        """An accumulator of the same model and options to which nothing was added.
+        """Return an accumulator of the same model and options to which nothing was added.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class Accumulator:
         )
 
     def copy(self) -> "Accumulator":
-        """An independent accumulator with the same sums, which never change themselves.
+        """Return an independent accumulator with the same sums, which never change themselves.
 
         Returns
         -------
@@ -212,7 +212,7 @@ class Accumulator:
         return other
 
     def without_labels(self) -> "Accumulator":
-        """The same sums and number of episodes, without the episodes' labels: what needs to travel.
+        """Return the same sums and number of episodes, without the episodes' labels: what needs to travel.
 
         Returns
         -------
@@ -224,7 +224,7 @@ class Accumulator:
         return other
 
     def moments(self, without: int | None = None) -> Moments:
-        """The sum over all folds, or all but one.
+        """Return the sum over all folds, or all but one.
 
         Parameters
         ----------

@@ -32,12 +32,12 @@ class Model(Protocol):
 
     @property
     def n_states(self) -> int:
-        """n."""
+        """Number n of states."""
         ...
 
     @property
     def n_actions(self) -> int:
-        """d."""
+        """Number d of actions."""
         ...
 
     @property
@@ -51,15 +51,15 @@ class Model(Protocol):
         ...
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
-        """The sums of samples at states X (N, n) with weights (N,); stacked where there are several models."""
+        """Return the sums of samples at states X (N, n) with weights (N,); stacked where there are several models."""
         ...
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
-        """A solution w (..., P / K, K) of the moments as parameters, (P,) or (S, P)."""
+        """Return a solution w (..., P / K, K) of the moments as parameters, (P,) or (S, P)."""
         ...
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy with parameters w at states X (N, n): (N, d)."""
+        """Return the policy with parameters w at states X (N, n): (N, d)."""
         ...
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
@@ -75,7 +75,7 @@ class Model(Protocol):
         ...
 
     def compile(self, w: np.ndarray) -> Any:
-        """The policy with parameters w as a `CompiledPolicy`."""
+        """Compile the policy with parameters w."""
         ...
 
 
@@ -106,7 +106,7 @@ class GlobalModel:
         return isinstance(self.features, FullBasis)
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
-        """The sums of samples.
+        """Return the sums of samples.
 
         Parameters
         ----------
@@ -122,11 +122,11 @@ class GlobalModel:
         return parametric.moments(self.features, X, observation, weights)
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
-        """A solution w (P / K, K) of the moments as parameters (P,)."""
+        """Return a solution w (P / K, K) of the moments as parameters (P,)."""
         return w.T.reshape(-1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy with parameters w (P,) at states X (N, n): (N, d)."""
+        """Return the policy with parameters w (P,) at states X (N, n): (N, d)."""
         return self.features.evaluate(X, w)
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
@@ -147,7 +147,7 @@ class GlobalModel:
         return np.ones((len(X), 1))
 
     def compile(self, w: np.ndarray) -> Any:
-        """The policy with parameters w (P,) as a `CompiledPolicy`. Raises `PolicyError` where that is not known."""
+        """Compile the policy with parameters w (P,). Raises `PolicyError` where the features cannot be compiled."""
         if not isinstance(self.features, Compilable):
             raise PolicyError(
                 f"a policy with {type(self.features).__name__} features cannot be compiled, since they have no method "
@@ -197,7 +197,7 @@ class LocalModels:
 
     @property
     def n_states(self) -> int:
-        """n."""
+        """Number n of states."""
         return self.centers.shape[1]
 
     @property
@@ -211,7 +211,7 @@ class LocalModels:
         return isinstance(self.features, FullBasis)
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
-        """The sums of samples, stacked along a leading axis of M models.
+        """Return the sums of samples, stacked along a leading axis of M models.
 
         Parameters
         ----------
@@ -227,11 +227,11 @@ class LocalModels:
         return local.moments(self.features, self.centers, self.width, X, observation, weights)
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
-        """A solution w (M, P / K, K) of the moments as parameters (M, P)."""
+        """Return a solution w (M, P / K, K) of the moments as parameters (M, P)."""
         return w.swapaxes(-1, -2).reshape(len(w), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The policy with parameters w (M, P) at states X (N, n): (N, d)."""
+        """Return the policy with parameters w (M, P) at states X (N, n): (N, d)."""
         actions = np.zeros((len(X), self.n_actions))
         for start in range(0, len(X), BLOCK_ROWS):
             block = X[start : start + BLOCK_ROWS]
@@ -263,11 +263,11 @@ class LocalModels:
         return self.features.along(X, directions)
 
     def reach(self, X: np.ndarray) -> np.ndarray:
-        """The activations K_m(x), (N, M)."""
+        """Return the activations K_m(x), (N, M)."""
         return activations(X, self.centers, self.width)
 
     def compile(self, w: np.ndarray) -> Any:
-        """The policy with parameters w (M, P) as a `CompiledPolicy`. Raises `PolicyError` unless it is linear."""
+        """Compile the policy with parameters w (M, P). Raises `PolicyError` unless its models are linear."""
         from unconstrain.deploy.compiled import LocallyLinear
 
         linear = self.linear_parameters(w)
@@ -285,7 +285,7 @@ class LocalModels:
         return models[:, :, :-1].copy(), models[:, :, -1].copy()
 
     def _evaluate_each(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """The actions of every model, (N, M, d)."""
+        """Return the actions of every model, (N, M, d)."""
         M, d = len(w), self.n_actions
         if isinstance(self.features, FullBasis):
             B = self.features.basis(X)
@@ -293,7 +293,7 @@ class LocalModels:
         return np.stack([self.features.evaluate(X, each) for each in w], axis=1)
 
     def _mixed_spread(self, posterior: Posterior) -> Any:
-        """A function of states (N, n) and blend (N, M) that returns `Σ_m ω_m Φ Σ_m Φᵀ`, (N, d, d)."""
+        """Return a function of states (N, n) and blend (N, M) that returns `Σ_m ω_m Φ Σ_m Φᵀ`, (N, d, d)."""
         M, d = self.n_models, self.n_actions
         if not isinstance(self.features, FullBasis):
             one = GlobalModel(self.features, self.n_states, d)

@@ -55,7 +55,7 @@ class Moments:
 
     @classmethod
     def zeros(cls, batch: tuple[int, ...], n_parameters: int, n_targets: int) -> "Moments":
-        """The moments of no data.
+        """Return the moments of no data.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Moments:
 
     @staticmethod
     def sum(parts: Iterable["Moments"]) -> "Moments":
-        """The moments of all parts' data together.
+        """Return the moments of all parts' data together.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class Moments:
         return total
 
     def risk(self, w: np.ndarray) -> np.ndarray:
-        """The risk of candidates, `E(w) = s - 2 gᵀw + wᵀHw`, summed over samples.
+        """Return the risk of candidates, `E(w) = s - 2 gᵀw + wᵀHw`, summed over samples.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Moments:
         return np.maximum(error + self.squares[..., None], 0.0)
 
     def solve(self, alpha: float) -> np.ndarray:
-        """The solution `w = (H + λI)⁺ g` of least norm for one λ.
+        """Return the solution `w = (H + λI)⁺ g` of least norm for one λ.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Moments:
         return self.decompose().solve([alpha])[..., 0, :]
 
     def decompose(self) -> "Spectrum":
-        """The eigendecomposition of H, which solves for every λ at once.
+        """Return the eigendecomposition of H, which solves for every λ at once.
 
         Returns
         -------
@@ -220,7 +220,7 @@ class Spectrum:
         return self.values > np.maximum(floor, 0.0)
 
     def solve(self, alphas: ArrayLike) -> np.ndarray:
-        """The solutions `w = (H + λI)⁺ g` of least norm.
+        """Return the solutions `w = (H + λI)⁺ g` of least norm.
 
         Parameters
         ----------

@@ -209,7 +209,7 @@ def informative(projections: np.ndarray) -> np.ndarray:
 def observe(
     risk: str, U: np.ndarray, projections: np.ndarray | None = None, r: np.ndarray | None = None
 ) -> Observation:
-    """What a risk takes from recorded actions.
+    """Return what a risk takes from recorded actions.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def observe(
 
 
 def squared_errors(observation: Observation, P: np.ndarray) -> np.ndarray:
-    """The error of predictions behind the observation's projections.
+    """Return the error of predictions behind the observation's projections.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class Posterior:
 
     @classmethod
     def of(cls, moments: Moments, numbers_per_sample: int = 1) -> "Posterior":
-        """The posterior that moments determine.
+        """Return the posterior that moments determine.
 
         Parameters
         ----------

@@ -82,7 +82,7 @@ class EpisodeFolds:
         self.n_dealt += n_episodes
 
     def copy(self) -> "EpisodeFolds":
-        """The same folds, to be dealt to independently."""
+        """Return the same folds, to be dealt to independently."""
         other = EpisodeFolds(self.n_folds, self.fold_of)
         other.n_dealt = self.n_dealt
         return other
@@ -113,7 +113,7 @@ class EpisodeFolds:
 
 
 def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """The λ with the least risk on folds left out one at a time, or the largest that is as good.
+    """Return the λ with the least risk on folds left out one at a time, or the largest that is as good.
 
     Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
     each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added.

@@ -52,7 +52,7 @@ class Sums:
         )
 
     def rotated(self, by: int, n_folds: int) -> "Sums":
-        """The same sums, with fold k renamed to fold (k + by) mod n_folds.
+        """Return the same sums, with fold k renamed to fold (k + by) mod n_folds.
 
         Parameters
         ----------

@@ -177,7 +177,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
 
     def start(self, samples: Samples) -> Accumulator:
-        """An accumulator for this policy's options, its model placed by some samples, to which nothing was added.
+        """Return an empty accumulator for this policy's options, its model placed by some samples.
 
         Parameters
         ----------
@@ -205,7 +205,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return Accumulator(model, self.risk, self.alpha)
 
     def resume(self) -> Accumulator:
-        """A copy of the sums that this policy was solved from, to be added to.
+        """Return a copy of the sums that this policy was solved from, to be added to.
 
         Returns
         -------
@@ -291,7 +291,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return actions, spread
 
     def posterior(self) -> Posterior:
-        """What the samples say of the parameters and of their own noise. Costs an eigendecomposition.
+        """Return what the samples say of the parameters and of their own noise. Costs an eigendecomposition.
 
         Each sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
         more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
@@ -416,7 +416,7 @@ class Policy(RegressorMixin, BaseEstimator):
         save_object(path, Kind.POLICY, kept, check_usable)
 
     def compile(self) -> "CompiledPolicy":
-        """The fitted policy for a control loop: `step = policy.compile()`; `step(x)` for states (n,) or (N, n).
+        """Return the fitted policy for a control loop: `step = policy.compile()`; `step(x)` for states (n,) or (N, n).
 
         Returns
         -------
@@ -451,7 +451,7 @@ class Policy(RegressorMixin, BaseEstimator):
         onnx.save(self.compile(), Path(path))
 
     def solved(self, *, without: int | None = None) -> Self:
-        """A copy of this fitted policy, solved anew for its `alpha`, leaving out the samples of one fold if asked.
+        """Return a copy of this fitted policy, solved anew for its `alpha`, without one fold if asked.
 
         Parameters
         ----------
@@ -538,7 +538,7 @@ class Policy(RegressorMixin, BaseEstimator):
     def _check(
         self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
     ) -> tuple[Samples, bool]:
-        """The samples, checked, and whether actions are of shape (N,). Learns the number of states where `first`."""
+        """Check samples, and learn the number of states if `first`; also return whether actions are of shape (N,)."""
         self.check_options()
         if isinstance(X, Demonstrations):
             X, y, groups, projections = self._of_demonstrations(X, y, groups, projections)

@@ -34,7 +34,7 @@ class Unsure:
         return deviation > self.share * speed
 
     def measure(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Standard deviation and predicted speed.
+        """Compute the standard deviation and the predicted speed.
 
         Parameters
         ----------

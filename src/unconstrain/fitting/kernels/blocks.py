@@ -65,7 +65,7 @@ def rows_in_block(numbers: int, width: int) -> int:
 
 
 def working_space(name: str, *shape: int) -> np.ndarray:
-    """This thread's own working space, its contents those of the block before.
+    """Return this thread's own working space, its contents those of the block before.
 
     Memory new for every block would have to be mapped and cleared each time, which costs a fifth of the whole.
 

@@ -138,7 +138,7 @@ def _of_rows(
 def _receptive(
     X: np.ndarray, centers: np.ndarray, width: float, weights: np.ndarray | None, block: slice
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The weight (N, M) of each sample in each model, and which models (M,) any sample of the block reaches."""
+    """Return the weight (N, M) of each sample in each model, and which models (M,) any sample of the block reaches."""
     receptive = activations(X, centers, width)
     near = receptive.max(axis=0) > NEGLIGIBLE
     if weights is not None:

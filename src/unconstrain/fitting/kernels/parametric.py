@@ -125,7 +125,7 @@ def of_rows(
 
 
 def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """`A Bᵀ` of long rows, A (a, N) and B (b, N), a piece of their length at a time.
+    """Compute `A Bᵀ` of long rows, A (a, N) and B (b, N), a piece of their length at a time.
 
     BLAS copies both into the order in which it multiplies; where there are few rows that is half the work, and
     goes twice as fast while a piece fits the innermost cache.

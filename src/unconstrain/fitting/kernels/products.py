@@ -54,7 +54,7 @@ def distinct_products(
 def observed_products(
     rows: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """The distinct entries of `ω QᵀQ`.
+    """Return the distinct entries of `ω QᵀQ`.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
 
 def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
-    """The matrix H from its distinct entries.
+    """Return the matrix H from its distinct entries.
 
     Parameters
     ----------

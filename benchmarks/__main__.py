@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, step, stream
+from benchmarks import fits, identifiability, start, step, stream
 from benchmarks.ratio import Ratio
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
@@ -39,6 +39,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-linear-memory": stream.linear_memory,
     "stream-local-memory": stream.local_memory,
     **step.BENCHMARKS,
+    **start.BENCHMARKS,
 }
 
 

@@ -59,7 +59,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     KeyboardInterrupt
         The user pressed Ctrl-C.
     """
-    with reporting.forgiving_output() as output:
+    with reporting.warnings_as_sentences(), reporting.forgiving_output() as output:
         code = _run(arguments)
         output.flush()
     if output.failure is None:
@@ -76,6 +76,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         return program.main(arguments, prog_name="unconstrain", standalone_mode=False) or 0
     except Interrupted as stop:
         raise KeyboardInterrupt(stop.message) from None
+    except click.exceptions.NoArgsIsHelpError as asked:
+        reporting.say(asked.format_message())
+        return asked.exit_code
     except click.UsageError as error:
         hint = None if error.ctx is None else f"see {error.ctx.command_path} --help"
         reporting.say_error(error.format_message(), hint)

@@ -3,6 +3,7 @@
 import functools
 import os
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -61,7 +62,7 @@ class Command(click.Command):
                 raise
             place = f" {error.filename}" if error.filename is not None else ""
             sentence = f"cannot read or write{place}: {os.strerror(error.errno).lower()}"
-        raise Mistake(in_words_of_options(sentence, [name for name in map(_name, self.params) if name]))
+        raise Mistake(in_words_of_options(sentence, _options(context.find_root().command)))
 
 
 command = functools.partial(click.command, cls=Command)
@@ -76,39 +77,43 @@ class Group(click.Group):
         return list(self.commands)
 
 
-def in_words_of_options(sentence: str, names: list[str]) -> str:
+def in_words_of_options(sentence: str, options: Mapping[str, str]) -> str:
     """Write a sentence of the library's in the words of the command line.
 
     Parameters
     ----------
     sentence : str
         In which arguments are written ``name=``, or ``snake_case``, or begin a sentence that says what they must be.
-    names : list of str
-        The arguments that are options of the command.
+    options : mapping
+        The options that stand for arguments, by the argument's name.
 
     Returns
     -------
     str
-        The sentence with ``--name`` in their place.
+        The sentence with options in their place.
 
     Examples
     --------
-    >>> in_words_of_options("give action= or time_unit", ["action", "time_unit"])
+    >>> options = {"action": "--action", "time_unit": "--time-unit", "alpha": "--alpha", "resumable": "--resumable"}
+    >>> in_words_of_options("give action= or time_unit", options)
     'give --action or --time-unit'
-    >>> in_words_of_options('choose alpha="cv"', ["alpha"])
-    'choose --alpha "cv"'
+    >>> in_words_of_options('choose alpha="cv" and resumable=True', options)
+    'choose --alpha "cv" and --resumable'
     """
-    for name in names:
-        option = f"--{name.replace('_', '-')}"
+    for name, option in options.items():
         start = r"(?<![\w'\"/.=-])"  # neither part of a word, nor in quotes, nor of a path
-        # Followed by a value, unless by a space or the end of a clause.
-        sentence = re.sub(rf"{start}{name}=(?!$|[\s,;:)]|\.(?:\s|$))", f"{option} ", sentence)
-        sentence = re.sub(rf"{start}{name}=", option, sentence)
+        sentence = re.sub(rf"{start}{name}=(?:True\b)?(?=$|[\s,;:)]|\.(?:\s|$))", option, sentence)
+        sentence = re.sub(rf"{start}{name}=", f"{option} ", sentence)
         if "_" in name:
             sentence = re.sub(rf"{start}{name}(?![\w'\"/.])", option, sentence)
         sentence = re.sub(rf"^{name}(?= must )", option, sentence)
     return sentence
 
 
-def _name(option: click.Parameter) -> str | None:
-    return option.name if isinstance(option, click.Option) else None
+def _options(program: click.Command) -> dict[str, str]:
+    """The options of all commands, by the argument that each is given to."""
+    commands = program.commands.values() if isinstance(program, click.Group) else [program]
+    options = (
+        option for command in commands for option in command.params if isinstance(option, click.Option)
+    )
+    return {option.name: option.opts[-1] for option in options if option.name is not None}

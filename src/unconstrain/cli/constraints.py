@@ -27,6 +27,7 @@ N_CENTERS = 10
 )
 @click.option(
     "--rows",
+    "n_constraints",
     type=click.IntRange(min=1),
     metavar="NUMBER",
     help="How many rows; by default as many as the motion tells (constant), or 1.",
@@ -43,7 +44,7 @@ N_CENTERS = 10
 def constraints(
     recorded: recordings.Recorded,
     model: str,
-    rows: int | None,
+    n_constraints: int | None,
     n_centers: int | None,
     out: Path,
     figure: Path | None,
@@ -59,10 +60,10 @@ def constraints(
     from unconstrain.features import NormalizedRBF
 
     if model == "constant":
-        estimator = ConstantConstraint(rows)
+        estimator = ConstantConstraint(n_constraints)
     else:
         features = NormalizedRBF(n_centers or N_CENTERS) if model == "rbf" else None
-        estimator = FeatureConstraint(features, rows or 1)
+        estimator = FeatureConstraint(features, n_constraints or 1)
     with working("reading"):
         demos = recorded.load()
     recordings.describe(demos)

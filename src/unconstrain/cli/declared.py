@@ -27,9 +27,9 @@ class ColumnNames(click.ParamType):
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[str | int]:
-        """Parse the text; an empty name is a mistake."""
-        if isinstance(value, list):
+    ) -> str | int | list[str | int]:
+        """Parse the text into one column, or a list of several; an empty name is a mistake."""
+        if not isinstance(value, str):
             return value
         try:
             names = [n.strip() for row in csv.reader([value], skipinitialspace=True) for n in row]
@@ -41,7 +41,8 @@ class ColumnNames(click.ParamType):
                 param,
                 ctx,
             )
-        return [int(name) if name.isdecimal() and name.isascii() else name for name in names]
+        columns = [int(name) if name.isdecimal() and name.isascii() else name for name in names]
+        return columns if len(columns) > 1 else columns[0]
 
 
 class ColumnName(ColumnNames):
@@ -51,12 +52,10 @@ class ColumnName(ColumnNames):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the text; more than one column is a mistake."""
-        if isinstance(value, int):
-            return value
-        names = super().convert(value, param, ctx)
-        if len(names) > 1:
-            self.fail(f"it takes one column, got {len(names)}: {value}", param, ctx)
-        return names[0]
+        column = super().convert(value, param, ctx)
+        if isinstance(column, list):
+            self.fail(f"it takes one column, got {len(column)}: {value}", param, ctx)
+        return column
 
 
 class Number(click.ParamType):

@@ -26,7 +26,7 @@ THRESHOLD = 0.01
     "-k",
     "--most",
     "most",
-    type=click.IntRange(min=1),
+    type=click.IntRange(1, 100),
     metavar="NUMBER",
     default=3,
     show_default=True,

@@ -70,7 +70,7 @@ model = gathered(
     [
         option(
             "--model",
-            "name",
+            "model",
             type=click.Choice(MODELS),
             default="locally-linear",
             show_default=True,
@@ -113,6 +113,6 @@ model = gathered(
             section="Model",
         ),
     ],
-    Model,
+    lambda model, **options: Model(model, **options),
 )
 """Decorator of a command that fits a model, and is called with `model=Model(...)`."""

@@ -5,6 +5,7 @@ import math
 import os
 import shlex
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TextIO
@@ -74,6 +75,18 @@ class ForgivingOutput(io.TextIOWrapper):
             super().flush()
 
 
+@contextmanager
+def warnings_as_sentences() -> Iterator[None]:
+    """Print warnings of Python's to standard error as one sentence each, without the line of code they come from."""
+
+    def show(message: Warning | str, *place: object) -> None:
+        print(f"warning: {visible(str(message))}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
+
+
 def say(text: str = "") -> None:
     """Print text to standard output as it is, control characters made visible."""
     print(visible(text), flush=True)  # so that a reader of a pipe hears of it while the work goes on
@@ -94,21 +107,35 @@ def say_error(text: str, hint: str | None = None) -> None:
     """Print a mistake to standard error, and where to read more."""
     style, plain = ("\x1b[1;31m", "\x1b[0m") if _is_colored(sys.stderr) else ("", "")
     with suppress(OSError):
-        print(f"{style}error:{plain} {visible(text)}", file=sys.stderr)
+        print(f"{style}error:{plain} {visible(text, line=True)}", file=sys.stderr)
         if hint is not None:
             print(hint, file=sys.stderr)
 
 
-def visible(text: str) -> str:
+def visible(text: str, *, line: bool = False) -> str:
     r"""Write out what cannot be printed, so that no name of a file or column steers the terminal.
 
+    Parameters
+    ----------
+    text : str
+    line : bool
+        Whether line breaks are written out as well.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> visible("a\x1b[2Jb")
     'a\\x1b[2Jb'
     """
     if text.isprintable():
         return text
     return "".join(
-        c if c.isprintable() or c == "\n" else c.encode("unicode_escape", "surrogatepass").decode()
+        c
+        if c.isprintable() or (c == "\n" and not line)
+        else c.encode("unicode_escape", "surrogatepass").decode()
         for c in text
     )
 

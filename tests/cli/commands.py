@@ -12,7 +12,7 @@ def share(line):
     return float(line.split("%")[0].split()[-1]) / 100
 
 
-def program(*arguments, **options):
+def start(*arguments, **options):
     """The program as a process of its own."""
     command = [sys.executable, "-m", "unconstrain", *map(str, arguments)]
     return subprocess.run(command, text=True, env=os.environ | options.pop("env", {}), timeout=120, **options)

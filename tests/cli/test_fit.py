@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import unconstrain as uc
-from tests.cli.commands import COLUMNS, program, share
+from tests.cli.commands import COLUMNS, share, start
 from unconstrain import limit_cycle as toy
 from unconstrain.recordings.text import write_csv
 
@@ -75,7 +75,7 @@ def test_a_policy_is_saved_though_nobody_hears_what_is_said(movements, tmp_path,
         out = os.fdopen(writing, "w")
     with out:
         arguments = ("fit", movements, *COLUMNS, "--model", "linear", "--out", tmp_path / "p.skops")
-        ended = program(*arguments, stdout=out, stderr=subprocess.PIPE)
+        ended = start(*arguments, stdout=out, stderr=subprocess.PIPE)
     assert ended.returncode == 1
     assert ended.stderr.count("\n") == 1
     assert "error: standard output could not be written" in ended.stderr

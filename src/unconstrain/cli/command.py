@@ -62,7 +62,7 @@ class Command(click.Command):
                 raise
             place = f" {error.filename}" if error.filename is not None else ""
             sentence = f"cannot read or write{place}: {os.strerror(error.errno).lower()}"
-        raise Mistake(in_words_of_options(sentence, _options(context.find_root().command)))
+        raise Mistake(in_words_of_options(sentence, _options(context)))
 
 
 command = functools.partial(click.command, cls=Command)
@@ -110,10 +110,12 @@ def in_words_of_options(sentence: str, options: Mapping[str, str]) -> str:
     return sentence
 
 
-def _options(program: click.Command) -> dict[str, str]:
-    """The options of all commands, by the argument that each is given to."""
-    commands = program.commands.values() if isinstance(program, click.Group) else [program]
-    options = (
-        option for command in commands for option in command.params if isinstance(option, click.Option)
-    )
-    return {option.name: option.opts[-1] for option in options if option.name is not None}
+def _options(context: click.Context) -> dict[str, str]:
+    """Name the options of all commands by the arguments they are given to; those of this one come first."""
+    program = context.find_root().command
+    commands = [*program.commands.values()] if isinstance(program, click.Group) else []
+    found: dict[str, str] = {}
+    for each in (*commands, context.command):
+        options = (option for option in each.params if isinstance(option, click.Option))
+        found |= {option.name: option.opts[-1] for option in options if option.name is not None}
+    return found

@@ -79,7 +79,14 @@ class ForgivingOutput(io.TextIOWrapper):
 def warnings_as_sentences() -> Iterator[None]:
     """Print warnings of Python's to standard error as one sentence each, without the line of code they come from."""
 
-    def show(message: Warning | str, *place: object) -> None:
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
         print(f"warning: {visible(str(message))}", file=sys.stderr)
 
     with warnings.catch_warnings():

@@ -30,12 +30,13 @@ COLUMNS = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explaine
 @click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in that folder.")
 def demo(out: Path, overwrite: bool) -> None:
     """Simulate 40 constrained movements, learn the policy behind them, draw it."""
-    picture, table, data = out / "limit-cycle.png", out / "table.md", out / "movements.csv"
+    picture, table = out / "limit-cycle.png", out / "table.md"
+    data, others = out / "movements.csv", out / "others.csv"
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UnconstrainError(f"cannot make the folder {out}: {error.strerror}") from error
-    for path in (picture, table, data):
+    for path in (picture, table, data, others):
         outputs.check_new(path, "out", overwrite=overwrite)
     from unconstrain import demo as experiment
     from unconstrain import metrics, plot
@@ -51,12 +52,13 @@ def demo(out: Path, overwrite: bool) -> None:
             rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}", f"{share:.2%}"))
         plot.save(experiment.plot_fields(), picture)
         write_csv(training, data)
+        write_csv(test, others)
         _write_markdown(COLUMNS, rows, table)
     reporting.say_table(COLUMNS, rows, title="40 other movements, held out")
     reporting.say(
         "nUPE, nCPE: squared error without and with constraints, as a share of the policy's variance"
     )
-    reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}")
+    reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}\nheld out: {others}")
     reporting.say("\nnext, the same from a file (put your own in its place):")
     reporting.say(
         f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --episode episode --model rbf "

@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench format clean
+.PHONY: demo test bench reproduce format clean
 
 demo: $(VENV)/.demo
 	$(BIN)/unconstrain demo --out out/demo --overwrite
@@ -18,6 +18,10 @@ test: $(VENV)/.test
 # The two variables, where they are set, tell OpenBLAS to behave as on another machine than this.
 bench: $(VENV)/.test
 	env -u OPENBLAS_CORETYPE -u OPENBLAS_L2_SIZE $(BIN)/python -m benchmarks
+
+# Every experiment of the paper; hours. Finished trials are kept, and the same command goes on from them.
+reproduce: $(VENV)/.test
+	$(BIN)/python -m reproduction all
 
 format: $(VENV)/.test
 	$(BIN)/ruff check --fix .

@@ -5,6 +5,7 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Iterator
+from pydoc import locate
 
 import pytest
 from numpydoc.validate import validate
@@ -23,11 +24,7 @@ OPTIONAL = {"ES01", "SA01", "EX01"}
 UNTRUE = {"PR02", "PR03", "PR10", "GL06", "GL07"}
 # Not yet rewritten: a line goes when its area has landed, and none is left in the end.
 UNFINISHED = (
-    "unconstrain.fitting.",
-    "unconstrain.features.",
-    "unconstrain.policies.",
     "unconstrain.diagnostics.",
-    "unconstrain.selection.",
     "unconstrain.scaling.",
     "unconstrain.recordings.",
     "unconstrain.demonstrations.",
@@ -63,8 +60,10 @@ def public() -> list[str]:
 
 def faults(name: str, codes: set[str] | None = None) -> list[str]:
     """What numpydoc finds wrong with a docstring."""
+    # The signature of a protocol, (*args, **kwargs), is not what implements it.
+    optional = OPTIONAL | ({"PR01"} if getattr(locate(name), "_is_protocol", False) else set())
     found = validate(name)["errors"]
-    return [f"{code} {text}" for code, text in found if code not in OPTIONAL and code in (codes or {code})]
+    return [f"{code} {text}" for code, text in found if code not in optional and code in (codes or {code})]
 
 
 @pytest.mark.parametrize("name", MODULES)

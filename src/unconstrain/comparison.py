@@ -77,6 +77,7 @@ def compare_risks(
     Returns
     -------
     Comparison
+        Both, on the same held-out episodes.
 
     Raises
     ------

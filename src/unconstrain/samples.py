@@ -12,7 +12,9 @@ class Samples(NamedTuple):
     Parameters
     ----------
     states : array (N, n)
+        Where the samples are.
     actions : array (N, d)
+        What was done there.
     groups : array (N,), optional
         Episode labels.
     projections : array (N, d, d), optional

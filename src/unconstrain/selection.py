@@ -49,6 +49,7 @@ class Row:
     Parameters
     ----------
     name : str
+        Of the candidate.
     inconsistency : float
         Pooled over held-out samples, in squared units of the action; NaN where the candidate failed. Where projections
         are known it is the error under them.
@@ -267,7 +268,7 @@ def select_policy(
     return Selection(policies[rows[0].name], rows[0].name, table, policies)
 
 
-def _named(given, n: int, d: int) -> dict[str, Policy]:
+def _named(given: str | Sequence[Policy] | Mapping[str, Policy], n: int, d: int) -> dict[str, Policy]:
     if isinstance(given, str):
         if given != "auto":
             raise PolicyError(

@@ -63,12 +63,14 @@ def of_recordings(
     U : array (N, d)
         Actions.
     sample_weight : array (N,), optional
+        Weights of the samples.
     projections : array (N, d, d), optional
         NaN where not known.
 
     Returns
     -------
     information : Information
+        Of all models.
     counted : array (N,) of bool
         Which samples say something.
 
@@ -108,10 +110,12 @@ def of_fit(policy: Policy) -> Information:
     Parameters
     ----------
     policy : Policy
+        Fitted.
 
     Returns
     -------
     Information
+        Of all models.
 
     Raises
     ------

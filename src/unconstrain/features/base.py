@@ -46,6 +46,7 @@ class Features(Protocol):
         Returns
         -------
         self
+            Itself, fitted.
         """
         ...
 
@@ -114,10 +115,12 @@ class Compilable(Protocol):
         Parameters
         ----------
         w : array (P,)
+            Parameters.
 
         Returns
         -------
         CompiledPolicy
+            Ready to be called.
 
         Raises
         ------
@@ -133,10 +136,12 @@ def is_feature_map(candidate: object) -> bool:
     Parameters
     ----------
     candidate : object
+        Anything.
 
     Returns
     -------
     bool
+        True for an object, not a class, that has them.
     """
     return isinstance(candidate, Features) and not isinstance(candidate, type)
 
@@ -158,6 +163,7 @@ def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray
     Returns
     -------
     Features
+        The copy.
     """
     copy = clone(features, safe=False)
     weighted = sample_weight is not None and has_fit_parameter(copy, "sample_weight")
@@ -180,6 +186,7 @@ def fit_transformer(transformer: Any, X: np.ndarray, sample_weight: np.ndarray |
     Returns
     -------
     transformer
+        The copy.
     """
     weighted = sample_weight is not None and has_fit_parameter(transformer, "sample_weight")
     return clone(transformer).fit(X, **({"sample_weight": sample_weight} if weighted else {}))

@@ -5,6 +5,7 @@ order of the samples, so neither does a policy built on it.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from unconstrain.arrays import check_choice, check_finite
 from unconstrain.errors import PolicyError
@@ -18,13 +19,13 @@ WIDTH_PER_SPACING = 1.5
 
 def place(
     X: np.ndarray,
-    centers,
+    centers: str | ArrayLike,
     *,
     n_centers: int,
     width: float | None,
     coverage: float,
     sample_weight: np.ndarray | None = None,
-    random_state=None,
+    random_state: int | np.random.RandomState | None = None,
 ) -> tuple[np.ndarray, float]:
     """Centres (M, n) and width for states X (N, n).
 
@@ -69,7 +70,12 @@ def grid(X: np.ndarray, n_centers: int) -> np.ndarray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, n)
 
 
-def kmeans(X: np.ndarray, n_centers: int, sample_weight=None, random_state=None) -> np.ndarray:
+def kmeans(
+    X: np.ndarray,
+    n_centers: int,
+    sample_weight: np.ndarray | None = None,
+    random_state: int | np.random.RandomState | None = None,
+) -> np.ndarray:
     """Cluster means (scikit-learn's `KMeans`), of the states sorted first so that their order does not matter."""
     from sklearn.cluster import KMeans  # slow to import
 
@@ -120,7 +126,7 @@ def _spacing_width(centers: np.ndarray, X: np.ndarray) -> float:
     return float(np.sqrt(np.sum(np.var(X, axis=0)))) or 1.0
 
 
-def _positive_integer(n_centers) -> int:
+def _positive_integer(n_centers: object) -> int:
     if not isinstance(n_centers, int | np.integer) or n_centers < 1:
         raise PolicyError(f"n_centers must be a whole number of at least 1, got {n_centers!r}")
     return int(n_centers)

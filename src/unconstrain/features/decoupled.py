@@ -83,10 +83,12 @@ class DecoupledFeatures(BaseEstimator):
         d : int
             Dimension of the actions.
         sample_weight : array (N,), optional
+            Weights of the samples.
 
         Returns
         -------
         self
+            Itself, fitted.
 
         Raises
         ------
@@ -122,6 +124,7 @@ class DecoupledFeatures(BaseEstimator):
         X : array (N, n)
             States.
         directions : array (N, n)
+            One direction a state, of any length.
 
         Returns
         -------

@@ -10,6 +10,8 @@ learn w, and the gradient `∇Φ(x) = J_b(x)ᵀ w`, to act. Neither needs the Ja
 | `PolynomialFeatures`  | Σ_k q_k p_ik x_k^(p_ik - 1) Π_(l≠k) x_l^p_il, for the powers p                         |
 """
 
+from typing import Any
+
 import numpy as np
 from sklearn.preprocessing import PolynomialFeatures, SplineTransformer
 
@@ -21,7 +23,7 @@ BASES = (NormalizedRBF, SplineTransformer, PolynomialFeatures)
 EXTRAPOLATIONS = ("constant", "linear", "continue")
 
 
-def check_differentiable(basis) -> None:
+def check_differentiable(basis: object) -> None:
     """Raise a `PolicyError` for a basis whose derivative is not known here."""
     if not isinstance(basis, BASES):
         raise PolicyError(
@@ -35,7 +37,7 @@ def check_differentiable(basis) -> None:
         )
 
 
-def slopes(basis, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
+def slopes(basis: Any, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """`qᵀ∇b_i(x)` of a fitted basis at states X (N, n) along directions (N, n): (N, M)."""
     if isinstance(basis, NormalizedRBF):
         B = normalized_activations(X, basis.centers_, basis.width_)
@@ -50,7 +52,7 @@ def slopes(basis, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return sum(directions[:, k, None] * _partial(table, powers, k) for k in range(X.shape[1]))
 
 
-def gradient(basis, X: np.ndarray, w: np.ndarray) -> np.ndarray:
+def gradient(basis: Any, X: np.ndarray, w: np.ndarray) -> np.ndarray:
     """`∇ wᵀb(x)` of a fitted basis at states X (N, n), for w (M,): (N, n)."""
     if isinstance(basis, NormalizedRBF):
         B = normalized_activations(X, basis.centers_, basis.width_)

@@ -62,6 +62,7 @@ class FullFeatures(BaseEstimator):
         Returns
         -------
         self
+            Itself, fitted.
         """
         self.transformer_ = (
             None if self.transformer is None else fit_transformer(self.transformer, X, sample_weight)
@@ -98,6 +99,7 @@ class FullFeatures(BaseEstimator):
         X : array (N, n)
             States.
         directions : array (N, d)
+            One direction a state, of any length.
 
         Returns
         -------
@@ -135,6 +137,7 @@ def as_features(given: Any) -> Features:
     Returns
     -------
     Features
+        A feature map of its own, which may be fitted.
 
     Raises
     ------

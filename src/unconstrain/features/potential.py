@@ -65,6 +65,7 @@ class PotentialFeatures(BaseEstimator):
         Returns
         -------
         self
+            Itself, fitted.
 
         Raises
         ------
@@ -85,6 +86,7 @@ class PotentialFeatures(BaseEstimator):
         X : array (N, n)
             States.
         directions : array (N, n)
+            One direction a state, of any length.
 
         Returns
         -------

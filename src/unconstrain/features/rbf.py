@@ -25,7 +25,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
     n_centers : int
         How many centres to place; for "grid" the most that may be, the same number along each dimension.
     width : float, optional
-        σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit. None takes 1.5 times the centres' mean spacing (for
+        Width σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit. None takes 1.5 times the centres' mean spacing (for
         "coverage": the width that covers).
     centers : {"kmeans", "grid", "coverage"} or array (M, n)
         "grid" spans the data's range.
@@ -37,7 +37,9 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
     Attributes
     ----------
     centers_ : array (M, n)
+        Centres, as placed.
     width_ : float
+        σ, in the unit of the states.
 
     Examples
     --------
@@ -72,10 +74,12 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         y : None
             Ignored.
         sample_weight : array (N,), optional
+            Weights of the samples.
 
         Returns
         -------
         self
+            Itself, fitted.
 
         Raises
         ------
@@ -104,6 +108,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         Parameters
         ----------
         X : array (N, n)
+            States.
 
         Returns
         -------
@@ -119,10 +124,12 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         Parameters
         ----------
         input_features : ignored
+            For scikit-learn.
 
         Returns
         -------
         array (M,) of str
+            A name for each basis function.
         """
         check_is_fitted(self)
         return np.array([f"rbf{i}" for i in range(len(self.centers_))], dtype=object)

@@ -59,7 +59,9 @@ class Accumulator:
     Parameters
     ----------
     model : Model
+        Whose parameters are looked for.
     risk : {"inconsistency", "direct"}
+        What is taken from an action.
     alpha : float or "cv"
         The weight decay λ; "cv" chooses it by held-out risk, which keeps the sums of each fold apart.
     longest : float
@@ -111,10 +113,12 @@ class Accumulator:
         Parameters
         ----------
         samples : Samples
+            With or without episode labels.
 
         Returns
         -------
         array (N,) of int or None
+            The folds.
         """
         return None if self.folds is None else self.folds.assign(samples.groups, len(samples.states))
 
@@ -124,12 +128,14 @@ class Accumulator:
         Parameters
         ----------
         samples : Samples
+            In any number.
         fold : array (N,) of int, optional
             From `deal`.
 
         Returns
         -------
         Sums
+            By fold.
 
         Raises
         ------
@@ -163,6 +169,7 @@ class Accumulator:
         Parameters
         ----------
         sums : Sums
+            As `sums` returned them.
         """
         self.total = self.total + sums
 
@@ -193,6 +200,7 @@ class Accumulator:
         Returns
         -------
         Accumulator
+            Without sums.
         """
         folds = None if self.folds is None else EpisodeFolds(self.folds.n_folds, known_folds)
         return Accumulator(
@@ -205,6 +213,7 @@ class Accumulator:
         Returns
         -------
         Accumulator
+            With the same sums.
         """
         folds = None if self.folds is None else self.folds.copy()
         other = Accumulator(self.model, self.risk, self.alpha, self.longest, folds)
@@ -217,6 +226,7 @@ class Accumulator:
         Returns
         -------
         Accumulator
+            A smaller copy.
         """
         other = self.copy()
         if other.folds is not None:
@@ -234,6 +244,7 @@ class Accumulator:
         Returns
         -------
         Moments
+            Their sum.
 
         Raises
         ------
@@ -255,6 +266,7 @@ class Accumulator:
         Returns
         -------
         Solution
+            Parameters, and how λ was chosen.
 
         Raises
         ------

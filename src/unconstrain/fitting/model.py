@@ -113,11 +113,14 @@ class GlobalModel:
         X : array (N, n)
             States, of any precision.
         observation : Observation
+            What the recorded actions say.
         weights : array (N,), optional
+            Weights of the samples.
 
         Returns
         -------
         Moments
+            Their sums.
         """
         return parametric.moments(self.features, X, observation, weights)
 
@@ -180,6 +183,7 @@ class LocalModels:
     features : Features
         Fitted; the same for every model.
     centers : array (M, n)
+        Centres of the models.
     width : float
         σ, in the states' unit.
     n_actions : int
@@ -218,11 +222,14 @@ class LocalModels:
         X : array (N, n)
             States, of any precision.
         observation : Observation
+            What the recorded actions say.
         weights : array (N,), optional
+            Weights of the samples.
 
         Returns
         -------
         Moments
+            Their sums.
         """
         return local.moments(self.features, self.centers, self.width, X, observation, weights)
 

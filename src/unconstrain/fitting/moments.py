@@ -40,7 +40,7 @@ class Moments:
     g : array (..., P, K)
         K = 1, except for problems that share one H: the d dimensions of the action when nothing is projected.
     squares : array (...,)
-        s, in squared units of the action.
+        The sums s, in squared units of the action.
     weight : array (...,)
         `Σ ω_n`.
     n_samples : int
@@ -67,6 +67,7 @@ class Moments:
         Returns
         -------
         Moments
+            All zero.
         """
         return cls(
             H=np.zeros((*batch, n_parameters, n_parameters)),
@@ -121,6 +122,7 @@ class Moments:
         Returns
         -------
         Moments
+            Their sum.
         """
         first, *rest = parts
         total = first
@@ -152,11 +154,12 @@ class Moments:
         Parameters
         ----------
         alpha : float
-            λ.
+            Weight decay λ.
 
         Returns
         -------
         array (..., P, K)
+            Parameters, a column for each right-hand side.
 
         Notes
         -----
@@ -175,6 +178,7 @@ class Moments:
         Returns
         -------
         Spectrum
+            Eigenvalues and eigenvectors.
         """
         if self.H.ndim == 2:
             values, vectors = np.linalg.eigh(self.H)
@@ -230,6 +234,7 @@ class Spectrum:
         Returns
         -------
         array (..., P, L, K)
+            Parameters for each λ, a column for each right-hand side.
         """
         alphas = np.asarray(alphas, dtype=np.float64)
         determined = self.determined[..., None]
@@ -263,6 +268,7 @@ def load(path: str | PathLike[str]) -> Moments | list[Moments | None]:
     Parameters
     ----------
     path : path
+        The file.
 
     Returns
     -------

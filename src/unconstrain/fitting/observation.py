@@ -182,6 +182,7 @@ def unknown(projections: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     projections : array (N, d, d)
+        Nullspace projections.
 
     Returns
     -------
@@ -197,6 +198,7 @@ def informative(projections: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     projections : array (N, d, d)
+        Nullspace projections.
 
     Returns
     -------
@@ -214,6 +216,7 @@ def observe(
     Parameters
     ----------
     risk : {"inconsistency", "direct"}
+        Which risk.
     U : array (N, d)
         The actions.
     projections : array (N, d, d), optional
@@ -224,6 +227,7 @@ def observe(
     Returns
     -------
     Observation
+        Of all samples.
     """
     d = U.shape[1]
     if risk == "direct":

@@ -61,12 +61,14 @@ class Posterior:
         Parameters
         ----------
         moments : Moments
+            Of the samples.
         numbers_per_sample : int
             How many numbers each sample shows: 1, or d where nothing is projected.
 
         Returns
         -------
         Posterior
+            Of the parameters.
         """
         from scipy.linalg import cho_factor, cho_solve
 

@@ -32,6 +32,7 @@ class EpisodeFolds:
     Parameters
     ----------
     n_folds : int
+        Number of folds.
     known : dict, optional
         Folds of episodes that were dealt out elsewhere.
 
@@ -78,6 +79,7 @@ class EpisodeFolds:
         Parameters
         ----------
         n_episodes : int
+            How many to count.
         """
         self.n_dealt += n_episodes
 

@@ -57,11 +57,14 @@ class Sums:
         Parameters
         ----------
         by : int
+            How many folds further.
         n_folds : int
+            Number of folds.
 
         Returns
         -------
         Sums
+            A copy.
         """
         moments: list[Moments | None] = [None] * n_folds
         for fold, part in enumerate(self.moments):

@@ -75,10 +75,12 @@ class Policy(RegressorMixin, BaseEstimator):
         d : int
             Dimension of the actions.
         sample_weight : array (N,)
+            Weights of the samples.
 
         Returns
         -------
         Model
+            Its places fixed by the samples.
 
         Raises
         ------
@@ -119,6 +121,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         self
+            Itself, fitted.
 
         Raises
         ------
@@ -128,7 +131,7 @@ class Policy(RegressorMixin, BaseEstimator):
             An option is impossible.
         """
         fresh = copy(self)
-        samples, scalars = fresh._check(X, y, groups, sample_weight, projections, first=True)
+        samples, scalars = fresh.check_data(X, y, groups, sample_weight, projections, first=True)
         accumulator = fresh.start(samples)
         accumulator.add(samples)
         return self._adopt_from(fresh, accumulator, scalars)
@@ -150,12 +153,21 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X, y, groups, sample_weight, projections
-            As for `fit`.
+        X : array (N, n), or Demonstrations
+            States, and more, as for `fit`.
+        y : array (N, d) or (N,)
+            Actions.
+        groups : array (N,), optional
+            Episode labels.
+        sample_weight : array (N,), optional
+            Weights of the samples.
+        projections : array (N, d, d), optional
+            Nullspace projections, all NaN where not known.
 
         Returns
         -------
         self
+            Itself, fitted to all samples so far.
 
         Raises
         ------
@@ -166,7 +178,7 @@ class Policy(RegressorMixin, BaseEstimator):
             return self.fit(X, y, groups=groups, sample_weight=sample_weight, projections=projections)
         accumulator = self.resume()
         fresh = copy(self)
-        samples, _ = fresh._check(X, y, groups, sample_weight, projections, first=False)
+        samples, _ = fresh.check_data(X, y, groups, sample_weight, projections, first=False)
         accumulator.longest = max(accumulator.longest, accumulator.total.longest)
         accumulator.add(samples)
         if accumulator.total.misjudged:
@@ -187,6 +199,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Accumulator
+            To which samples may be added.
 
         Raises
         ------
@@ -210,6 +223,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Accumulator
+            To which more samples may be added.
 
         Raises
         ------
@@ -237,6 +251,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         self
+            Itself, fitted.
 
         Raises
         ------
@@ -250,7 +265,7 @@ class Policy(RegressorMixin, BaseEstimator):
     def predict(
         self, X: ArrayLike, return_std: bool = False, return_cov: bool = False
     ) -> Any:  # an array, or two of them
-        """Actions of the unconstrained policy.
+        """Compute actions of the unconstrained policy.
 
         Parameters
         ----------
@@ -338,6 +353,7 @@ class Policy(RegressorMixin, BaseEstimator):
         y : array (N, d) or (N,)
             Actions.
         sample_weight : array (N,), optional
+            Weights of the samples.
 
         Returns
         -------
@@ -383,6 +399,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Demonstrations
+            The movement, an episode for each start.
 
         Raises
         ------
@@ -439,6 +456,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Parameters
         ----------
         path : path
+            The file.
 
         Raises
         ------
@@ -461,6 +479,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Policy
+            The copy.
 
         Raises
         ------
@@ -535,10 +554,40 @@ class Policy(RegressorMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
 
-    def _check(
+    def check_data(
         self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
     ) -> tuple[Samples, bool]:
-        """Check samples, and learn the number of states if `first`; also return whether actions are of shape (N,)."""
+        """Check the options and the samples given to `fit`, and learn the number of states if they are the first.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n), or Demonstrations
+            States.
+        y : array_like of shape (N, d) or (N,), or None
+            Actions.
+        groups : array_like of shape (N,), or None
+            Episode labels.
+        sample_weight : array_like of shape (N,), or None
+            Weights of the samples.
+        projections : array_like of shape (N, d, d), or None
+            Nullspace projections, all NaN where not known.
+        first : bool
+            Whether these are the first samples.
+
+        Returns
+        -------
+        samples : Samples
+            As arrays that fit together.
+        scalars : bool
+            Whether actions were given as (N,).
+
+        Raises
+        ------
+        DataError
+            Arrays are not finite or do not fit together.
+        PolicyError
+            An option is impossible.
+        """
         self.check_options()
         if isinstance(X, Demonstrations):
             X, y, groups, projections = self._of_demonstrations(X, y, groups, projections)
@@ -592,6 +641,7 @@ def check_usable(policy: Policy) -> None:
     Parameters
     ----------
     policy : Policy
+        As it was read.
 
     Raises
     ------

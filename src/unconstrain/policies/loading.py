@@ -17,6 +17,7 @@ def load_policy(path: str | PathLike[str], *, trusted: Iterable[Any] = ()) -> Po
     Parameters
     ----------
     path : path
+        The file.
     trusted : classes and functions, optional
         Those of your own that the policy holds: a transformer, a function given to one. The file has only their
         names, so give the classes and functions themselves.

@@ -27,7 +27,7 @@ class LocallyLinearPolicy(Policy):
     features : transformer, Features, or None
         What each local model is made of, as for `ParametricPolicy`; None for the linear features `(x, 1)`.
     width : float, optional
-        σ, in the states' unit. None takes the width at which `n_centers` models reach the coverage, or, for other
+        Width σ, in the states' unit. None takes the width at which `n_centers` models reach the coverage, or, for other
         placements, 1.5 times the centres' mean spacing.
     centers : {"coverage", "kmeans", "grid"} or array (M, n)
         Where the models lie.
@@ -35,7 +35,9 @@ class LocallyLinearPolicy(Policy):
         Every sample has a weight of at least this in some model; with a width given it sets their number.
     n_centers : int
         How many models, where neither a width nor the centres themselves say so.
-    risk, alpha
+    risk : {"inconsistency", "direct"}
+        As for `ParametricPolicy`.
+    alpha : "cv" or float
         As for `ParametricPolicy`; one λ for all models.
     random_state : int, optional
         For "kmeans".
@@ -43,7 +45,9 @@ class LocallyLinearPolicy(Policy):
     Attributes
     ----------
     centers_ : array (M, n)
+        Centres, as placed.
     width_ : float
+        σ, in the unit of the states.
     weights_ : array (M, P)
         The parameters of each model.
     coef_ : array (M, d, n)
@@ -85,10 +89,12 @@ class LocallyLinearPolicy(Policy):
         d : int
             Dimension of the actions.
         sample_weight : array (N,)
+            Weights of the samples.
 
         Returns
         -------
         LocalModels
+            With centres and width.
 
         Raises
         ------

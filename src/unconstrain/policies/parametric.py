@@ -70,10 +70,12 @@ class ParametricPolicy(Policy):
         d : int
             Dimension of the actions.
         sample_weight : array (N,)
+            Weights of the samples.
 
         Returns
         -------
         GlobalModel
+            With features that are fitted.
 
         Raises
         ------

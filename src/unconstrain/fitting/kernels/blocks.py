@@ -23,6 +23,7 @@ def sum_over_blocks(
     Parameters
     ----------
     n_samples : int
+        Number N of samples.
     rows : int
         Samples in a block.
     shapes : sequence of shapes
@@ -59,6 +60,7 @@ def rows_in_block(numbers: int, width: int) -> int:
     Returns
     -------
     int
+        Rows of a block.
     """
     size = max(256, min(numbers // width, 11 * SAMPLES_IN_PIECE))
     return size - size % SAMPLES_IN_PIECE if size > SAMPLES_IN_PIECE else size
@@ -74,10 +76,12 @@ def working_space(name: str, *shape: int) -> np.ndarray:
     name : str
         What it is used for.
     *shape : int
+        Shape of the array.
 
     Returns
     -------
     array
+        Whose contents are arbitrary.
     """
     held: np.ndarray | None = getattr(_spaces, name, None)
     if held is None or held.shape != shape:

@@ -43,6 +43,7 @@ def moments(
     features : Features
         Fitted; the same for every model.
     centers : array (M, n)
+        Centres of the models.
     width : float
         σ, in the states' unit.
     X : array (N, n)
@@ -50,6 +51,7 @@ def moments(
     observation : Observation
         Of N samples.
     weights : array (N,), optional
+        Weights of the samples.
 
     Returns
     -------

@@ -42,6 +42,7 @@ def moments(
     observation : Observation
         Of N samples.
     weights : array (N,), optional
+        Weights of the samples.
 
     Returns
     -------

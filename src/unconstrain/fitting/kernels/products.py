@@ -90,6 +90,7 @@ def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
     Returns
     -------
     array (N, d)
+        A pull a sample.
     """
     if rows.shape[1] == 1:
         return rows[:, 0] * targets
@@ -102,12 +103,14 @@ def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
     Parameters
     ----------
     products : array (..., M(M+1)/2, d(d+1)/2)
+        Distinct entries.
     M, d : int
         Numbers of features and of actions.
 
     Returns
     -------
     array (..., dM, dM)
+        Symmetric matrices.
     """
     over_q = products[..., pair_index(d)]  # (..., pairs of b, d, d)
     full = np.moveaxis(over_q, -3, -1)[..., pair_index(M)]  # (..., d, d, M, M)

@@ -140,7 +140,7 @@ def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):
         (("--min-speed", "0.1", "--checkpoint", "a.npz"), "--min-speed needs all data in memory"),
         (("--model", "auto", "--checkpoint", "a.npz"), "--model auto needs all data in memory"),
         (("--cluster", "local", "--checkpoint", "a.npz"), "leave out --checkpoint or --cluster"),
-        (("--cluster", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
+        (("--cluster", "tcp://127.0.0.1:1"), "no Dask scheduler answered"),
     ],
 )
 def test_mistakes_are_told_in_one_sentence(run, folder, options, sentence):

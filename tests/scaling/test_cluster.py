@@ -167,7 +167,7 @@ def test_mistakes_are_told_in_one_sentence(client, monkeypatch):
     with pytest.raises(uc.errors.DataError, match="a cluster learns from files"):
         distributed.fit(uc.ParametricPolicy(alpha=1e-6), [(X, U)], client)
     with (
-        pytest.raises(uc.errors.UnconstrainError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1"),
+        pytest.raises(uc.errors.UnconstrainError, match=r"no Dask scheduler answered at tcp://127.0.0.1:1"),
         distributed.connected("tcp://127.0.0.1:1", timeout=0.5),
     ):
         pass

@@ -6,10 +6,8 @@ episode belongs to is decided before, by a pass over the episode column alone, s
 it in.
 """
 
-import logging
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,7 +23,10 @@ from unconstrain.recordings.dataset import Dataset
 from unconstrain.recordings.reading import Reading
 from unconstrain.recordings.roles import Keys
 from unconstrain.recordings.table import Key
+from unconstrain.scaling.connection import as_finished, connected
 from unconstrain.scaling.stream import BATCH_ROWS, SAMPLE_ROWS, begin, deal, finish, open_source
+
+__all__ = ["connected", "fit"]
 
 PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
 
@@ -96,42 +97,6 @@ def fit(
     return finish(policy, accumulator, opened)
 
 
-@contextmanager
-def connected(cluster: str, timeout: float = 10.0) -> Iterator[Any]:
-    """A client of the scheduler at an address such as `tcp://host:8786`, or of a cluster of this machine, "local".
-
-    timeout: seconds in which the scheduler must answer.
-    Raises `UnconstrainError` where Dask is not installed, no scheduler answers, or no workers can be started.
-    """
-    try:
-        import distributed
-    except ImportError as error:
-        raise UnconstrainError(
-            "a cluster needs Dask, which is not installed: pip install 'unconstrain[distributed]'"
-        ) from error
-    if cluster == "local":
-        try:  # what goes wrong with a part is raised here, so workers need not log it as well
-            local = distributed.LocalCluster(
-                threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
-            )
-        except RuntimeError as error:
-            raise UnconstrainError(
-                "no worker processes could be started on this machine: in a script, call this below "
-                'if __name__ == "__main__":, as each of them imports the script'
-            ) from error
-        with local, distributed.Client(local) as client:
-            yield client
-        return
-    try:
-        client = distributed.Client(cluster, timeout=timeout)
-    except (OSError, ValueError, TypeError) as error:
-        raise UnconstrainError(
-            f"no Dask scheduler answers at {cluster}: check the address, which looks like tcp://host:8786"
-        ) from error
-    with client:
-        yield client
-
-
 def divided(source: Dataset, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
     """The parts of a source, of `rows` rows or more, with the folds of their episodes, which are dealt out here."""
     if source.needs_whole_episodes:
@@ -194,7 +159,7 @@ def _added_up(
     setup = client.submit(_setup, empty, replace(source, shards=shards), pure=False)
     level = [client.submit(_sum_of_part, setup, part, pure=False) for part in parts]
     rows = {future.key: part.stop - part.start for future, part in zip(level, parts, strict=True)}
-    finished = distributed.as_completed(level)
+    left = list(level)
     while len(level) > 1:
         pairs = [
             client.submit(_sum_of_two, a, b, pure=False)
@@ -205,13 +170,16 @@ def _added_up(
     done = 0
     report(0, source.n_rows)
     try:
-        for future in finished:
+        for future in as_finished(client, list(left)):
             if future.status == "error":
                 break
+            left.remove(future)
             done += rows[future.key]
             if future is not total:
                 future.release()
             report(done, source.n_rows)
+        for _ in as_finished(client, [total]):
+            pass
         return total.result()
     except distributed.KilledWorker as error:
         raise UnconstrainError(
@@ -219,7 +187,8 @@ def _added_up(
             "workers more, or learn with fewer features or smaller batch_rows"
         ) from error
     finally:
-        client.cancel([total, *finished.futures])
+        if client.status == "running":  # else there is nobody to tell
+            client.cancel([total, *left])
 
 
 def _setup(empty: Accumulator, source: Dataset) -> tuple[Accumulator, Dataset]:

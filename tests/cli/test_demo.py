@@ -7,7 +7,12 @@ def test_demo_ends_with_a_command_that_works_twice(run, tmp_path):
     folder = tmp_path / "a [demo] of mine"
     code, out, _ = run("demo", "--out", folder.name)
     assert code == 0
-    assert {p.name for p in folder.iterdir()} == {"limit-cycle.png", "table.md", "movements.csv", "others.csv"}
+    assert {p.name for p in folder.iterdir()} == {
+        "limit-cycle.png",
+        "table.md",
+        "movements.csv",
+        "others.csv",
+    }
     last = shlex.split(out.strip().splitlines()[-1])
     assert last[0] == "unconstrain"
     for _ in range(2):

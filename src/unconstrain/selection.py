@@ -1,4 +1,4 @@
-"""Choosing among policies by what the recordings alone can tell: inconsistency on episodes held out.
+"""Choosing among policies by their inconsistency on episodes held out, which needs nothing but recordings.
 
 Every candidate is fitted once, its samples added up by fold. Leaving a fold out is a subtraction of its moments, so
 the solution without fold k, with λ chosen anew among the other folds, costs no second pass over the data. Its
@@ -30,6 +30,7 @@ from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeat
 from unconstrain.fitting.observation import observe, squared_errors
 from unconstrain.fitting.solve import splits
 from unconstrain.policies.base import Policy
+from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 
@@ -58,7 +59,7 @@ class Row:
     explained : float
         Share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
     alpha : float
-        λ, as chosen on all the data.
+        Weight decay λ, as chosen on all the data.
     n_parameters : int
         Of all actions together, of each local model.
     seconds : float
@@ -106,7 +107,7 @@ class Table:
         raise KeyError(name)
 
     def __str__(self) -> str:
-        """Return a Markdown table, its columns aligned."""
+        """Format a Markdown table, its columns aligned."""
         head = ("candidate", self.measure, "explained", "λ", "parameters", "seconds")
         lines = [head, *(_cells(row) for row in self.rows if row.problem is None)]
         widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
@@ -142,7 +143,7 @@ class Selection:
 
 
 def candidates(n: int, d: int) -> dict[str, Policy]:
-    """Return the candidates of "auto", all with λ chosen by held-out inconsistency.
+    """Make the candidates of "auto", all with λ chosen by held-out inconsistency.
 
     Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
     even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
@@ -188,7 +189,7 @@ def select_policy(
     n_jobs: int | None = None,
     progress: Callable[[Row], None] | None = None,
 ) -> Selection:
-    """Return the candidate with the least inconsistency on held-out episodes, fitted to all the data.
+    """Choose the candidate with the least inconsistency on held-out episodes, and fit it to all the data.
 
     Parameters
     ----------
@@ -232,14 +233,10 @@ def select_policy(
     """
     import joblib
 
-    if isinstance(X, Demonstrations):
-        demos = X
-        groups = demos.episodes if groups is None and demos.n_episodes > 1 else groups
-        projections = demos.projections if projections is None else projections
-        X, U = demos.states, demos.actions
-    X, U = check_samples(ParametricPolicy(), X, U, reset=True, min_samples=2)
+    states, U, groups, projections = unpack_demonstrations(X, U, groups, projections)
+    X, U = check_samples(ParametricPolicy(), states, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
-    named = _named(candidates, X.shape[1], actions.shape[1])
+    named = _name_candidates(candidates, X.shape[1], actions.shape[1])
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
     # What no candidate could be judged on is told here, as the mistake it is, and not as each one's failure.
@@ -268,7 +265,9 @@ def select_policy(
     return Selection(policies[rows[0].name], rows[0].name, table, policies)
 
 
-def _named(given: str | Sequence[Policy] | Mapping[str, Policy], n: int, d: int) -> dict[str, Policy]:
+def _name_candidates(
+    given: str | Sequence[Policy] | Mapping[str, Policy], n: int, d: int
+) -> dict[str, Policy]:
     if isinstance(given, str):
         if given != "auto":
             raise PolicyError(
@@ -323,7 +322,7 @@ def _judge(
 def _hold_out(
     policy: Policy, X: np.ndarray, U: Any, groups: np.ndarray | None, projections: np.ndarray | None
 ) -> tuple[Policy, np.ndarray, np.ndarray]:
-    """Return the policy fitted to all samples; held-out predictions (N, d); the fold of each sample (N,)."""
+    """Fit a policy to all samples, predict held-out ones (N, d), and tell the fold of each sample (N,)."""
     if policy.alpha != "cv":  # `fit` does not get to see it
         check_number(policy.alpha, "alpha", positive=False)
     fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)

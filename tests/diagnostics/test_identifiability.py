@@ -12,8 +12,9 @@ import unconstrain as uc
 from reproduction.plants import arm
 from tests.problems import problems
 from unconstrain import limit_cycle as toy
-from unconstrain.diagnostics.information import of_recordings
-from unconstrain.diagnostics.spectrum import directions
+from unconstrain.diagnostics.identify import check_recordings
+from unconstrain.diagnostics.information import Information
+from unconstrain.diagnostics.spectrum import compute_directions
 from unconstrain.motion import moving
 from unconstrain.policies.unsure import Unsure
 
@@ -45,15 +46,16 @@ def test_what_was_seen_is_at_most_everything(problem):
         return
     for policy in fitted(X, U):
         for projections in (None, N):
-            information, _ = of_recordings(policy, X, U, projections=projections)
-            for H, G in zip(information.moments.H, information.whole, strict=True):
+            samples, _ = check_recordings(policy, X, U, projections=projections)
+            information = Information.from_samples(policy, samples)
+            for H, G in zip(information.observed, information.whole, strict=True):
                 G = np.kron(np.eye(information.copies), G)
                 scale = np.linalg.eigvalsh(G)[-1]
                 assert np.linalg.eigvalsh(G - H)[0] >= -1e-9 * scale
                 assert np.linalg.eigvalsh(H)[0] >= -1e-9 * scale
-            for one, H in zip(directions(information), information.moments.H, strict=True):
+            for one, H in zip(compute_directions(information), information.observed, strict=True):
                 # ε / RELATIVE_CUTOFF is what rounding may do to a share.
-                np.testing.assert_allclose(one.vectors.T @ H @ one.vectors, np.diag(one.seen), atol=1e-3)
+                np.testing.assert_allclose(one.vectors.T @ H @ one.vectors, np.diag(one.shares), atol=1e-3)
 
 
 @settings(deadline=None, max_examples=15)
@@ -67,8 +69,6 @@ def test_moments_alone_tell_the_same(problem, weighted):
         if isinstance(policy, uc.ParametricPolicy) and isinstance(policy.features, uc.DecoupledFeatures):
             continue
         given_data = uc.identifiability(policy, X, U, sample_weight=weights)
-        if isinstance(policy, uc.ParametricPolicy) and isinstance(policy.features, SplineTransformer):
-            policy.risk = "inconsistency"  # "auto" may have seen projections, which splines do not show
         by_moments = uc.identifiability(policy)
         np.testing.assert_allclose(by_moments.spectrum, given_data.spectrum, atol=1e-3)
 
@@ -81,6 +81,19 @@ def test_projections_show_more_and_their_moments_ask_for_the_recordings():
     np.testing.assert_allclose(report.spectrum, 1.0)
     with pytest.raises(uc.errors.PolicyError, match="give the recordings"):
         uc.identifiability(policy)
+
+
+def test_demonstrations_bring_their_actions_episodes_and_projections():
+    demos = toy.demonstrate(3, random_state=0)
+    known = uc.constraints.unconstrained(2, len(demos.states))
+    demos = replace(demos, projections=known, episode_labels=("a", "b", "c"))
+    policy = uc.ParametricPolicy(alpha=1e-6).fit(demos)
+    report = uc.identifiability(policy, demos)
+    arrays = uc.identifiability(policy, demos.states, demos.actions, projections=known)
+    np.testing.assert_array_equal(report.spectrum, arrays.spectrum)
+    assert {one.episode for one in report.contributions()} == {"a", "b", "c"}
+    with pytest.raises(uc.errors.DataError, match="bring their own actions"):
+        uc.identifiability(policy, demos, demos.actions)
 
 
 @settings(deadline=None, max_examples=20)
@@ -111,13 +124,13 @@ def test_bounds_hold_for_policies_in_the_span(seed, d, off):
     w = policy.solution_.w
     policy.solution_ = replace(policy.solution_, w=w + off * rng.normal(size=w.shape))
     report = uc.identifiability(policy, X, U)
-    (one,) = directions(report.information)
+    (one,) = compute_directions(report.information)
     true = np.hstack([W.T, np.zeros((d, 1))]).ravel()
     (G,) = report.information.whole
     parts = one.vectors.T @ np.kron(np.eye(d), G) @ (policy.weights_ - true)
-    weight = report.information.moments.weight[0]
+    weight = float(report.information.moments.weight)
     assert np.all(parts**2 / weight <= report.bound_of_directions[0] * (1 + 1e-6) + 1e-9 * off**2)
-    determined = one.seen >= report.threshold
+    determined = one.shares >= report.threshold
     assert np.sum(parts[determined] ** 2) / weight <= report.bound_determined * (1 + 1e-6) + 1e-12
 
 

@@ -61,15 +61,7 @@ def diagnose(
         policy = model.build()
         policy.fit(demos.states, demos.actions, groups=demos.folds(folds), projections=demos.projections)
         report("diagnosing")
-        labels = [demos.episode_labels[code] for code in demos.episodes]
-        found = identifiability(
-            policy,
-            demos.states,
-            demos.actions,
-            groups=labels,
-            threshold=threshold,
-            projections=demos.projections,
-        )
+        found = identifiability(policy, demos, threshold=threshold)
         text = found.describe(demos.state_names, demos.action_names, most)
     if figure is not None:
         from unconstrain import plot

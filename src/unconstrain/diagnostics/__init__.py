@@ -1,16 +1,18 @@
-"""What the recordings cannot tell: how far they determine a policy, where they do not, and what to record next.
+"""How far recordings determine a policy, where they do not, and what to record next.
 
-information.py  H, what was seen, and G, what full observation would have shown
-spectrum.py     their generalised eigenvalues: the share of each direction that was seen
-bound.py        how large the error can be, given the inconsistency
-coverage.py     motions never seen near a state
-advice.py       the recordings that would tell most
-episodes.py     which recordings tell most, and which could be dropped
-report.py       all of it in one object, `identifiability(policy, X, U)`
-words.py        and in sentences
-pictures.py     and drawn
+identify.py     the function `identifiability(policy, X, U)`, which checks the recordings
+report.py       the report that it returns
+information.py  H, what was observed, and G, what full observation would have shown
+spectrum.py     the generalised eigenvalues of (H, G): the observed share of each direction of the policy
+bound.py        bounds of the error, given the inconsistency
+coverage.py     directions of motion that were not observed near a state
+regions.py      recorded states where the policy is known least
+advice.py       recordings that would lessen the expected error most
+episodes.py     which recordings determine most, and which could be dropped
+words.py        the report in sentences
 """
 
-from unconstrain.diagnostics.report import Identifiability, identifiability
+from unconstrain.diagnostics.identify import identifiability
+from unconstrain.diagnostics.report import Identifiability
 
 __all__ = ["Identifiability", "identifiability"]

@@ -1,15 +1,15 @@
-"""Bounds from the other side: how large the unconstrained error can be, given the inconsistency.
+"""Bounds of the unconstrained policy error (UPE), given the inconsistency.
 
 Assume that the true policy is in the model's span, `π = Φ w*`, and that actions were recorded without noise, so that
 `r = ûᵀΦ w*`. With `δ = w - w*` and sums over the data's states (everything here is divided by their weight),
 
-    E_i(w) = δᵀHδ = Σ_k λ_k a_k²,     UPE(w) = δᵀGδ = Σ_k a_k²,     δ = Σ_k a_k z_k + (what G does not see)
+    E_i(w) = δᵀHδ = Σ_k λ_k a_k²,     UPE(w) = δᵀGδ = Σ_k a_k²,     δ = Σ_k a_k z_k + (what G does not change)
 
 in the generalised eigenvectors of (H, G). Hence, for any w whatever,
 
     UPE <= E_i / λ_min,     a_k² <= E_i / λ_k,     Σ_{λ_k >= τ} a_k² <= E_i / min{λ_k : λ_k >= τ}.
 
-The last is the share of the error in the directions that are determined; of the others the data say nothing. With
+The last is the share of the error in the directions that are determined; of the other directions nothing is known. With
 noise, or a policy outside the span, `√E_i(w)` in these is replaced by `√E_i(w) + √E_i(w*)` (triangle inequality).
 
 Local models are fitted alone: each has a bound of its own, on its states weighted by its receptive field K_m. The
@@ -23,15 +23,32 @@ import numpy as np
 from unconstrain.diagnostics.spectrum import THRESHOLD
 
 
-def bounds(
-    risks: np.ndarray, seen: list[np.ndarray], weight: float, threshold: float = THRESHOLD
+def compute_bounds(
+    risks: np.ndarray, spectra: list[np.ndarray], weight: float, threshold: float = THRESHOLD
 ) -> tuple[float, float]:
-    """Bounds of UPE, on all directions and on those determined, in squared units of the action, a mean over states.
+    """Bound the unconstrained policy error.
 
-    risks: E_i of each model, (S,), summed over samples. seen: λ of each, ascending. weight: what to divide by.
+    Parameters
+    ----------
+    risks : ndarray of shape (S,)
+        E_i of each model, summed over samples, in squared units of the action.
+    spectra : list of ndarray of shape (R,)
+        Shares λ of each model, ascending.
+    weight : float
+        What to divide by, to make sums means.
+    threshold : float
+        The least λ of a determined direction.
+
+    Returns
+    -------
+    everywhere : float
+        Bound of the mean squared error along all directions, in squared units of the action; inf where a direction was
+        not observed.
+    determined : float
+        Bound along determined directions.
     """
     everywhere = determined = 0.0
-    for error, values in zip(risks, seen, strict=True):
+    for error, values in zip(risks, spectra, strict=True):
         if not len(values):
             continue
         everywhere += error / values[0] if values[0] > 0 else np.inf
@@ -40,10 +57,25 @@ def bounds(
     return everywhere / weight, determined / weight
 
 
-def per_direction(risks: np.ndarray, seen: list[np.ndarray], weights: np.ndarray) -> list[np.ndarray]:
-    """Bounds `E_i / λ_k` of the mean squared error along each direction, a list of arrays (R,); inf where λ is 0."""
+def bound_directions(risks: np.ndarray, spectra: list[np.ndarray], weights: np.ndarray) -> list[np.ndarray]:
+    """Bound the mean squared error along each direction by `E_i / λ_k`.
+
+    Parameters
+    ----------
+    risks : ndarray of shape (S,)
+        E_i of each model, summed over samples, in squared units of the action.
+    spectra : list of ndarray of shape (R,)
+        Shares λ of each model, ascending.
+    weights : ndarray of shape (S,)
+        Summed sample weights of each model.
+
+    Returns
+    -------
+    list of ndarray of shape (R,)
+        In the order of `spectra`; inf where λ is zero.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return [
             np.where(values > 0, error / values, np.inf) / weight
-            for error, values, weight in zip(risks, seen, weights, strict=True)
+            for error, values, weight in zip(risks, spectra, weights, strict=True)
         ]

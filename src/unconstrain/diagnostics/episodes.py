@@ -1,69 +1,91 @@
-"""Which recordings tell most, and which could be dropped.
+"""Which episodes determine most of a policy, and which could be dropped.
 
 With `A = (H + τG)⁻¹` on the range of G, a sample's leverage is `ω tr(V A Vᵀ)`. Leverages add up to
-`tr(A H) = Σ_k λ_k / (λ_k + τ)`, the number of determined directions counted softly, so an episode's sum says how many
-of them it holds. Episodes of the least leverage are dropped together as long as hardly any direction falls below the
-threshold; that is counted exactly, from H without them.
+`tr(A H) = Σ_k λ_k / (λ_k + τ)`, the number of determined directions counted softly, so the sum over an episode is the
+number of directions that it determines. Episodes of the least leverage are dropped together as long as hardly any
+direction falls below the threshold; that is counted exactly, from H without them.
 """
 
-from dataclasses import dataclass
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unconstrain.diagnostics.information import Information, stacked
-from unconstrain.diagnostics.spectrum import directions, shares_seen
-from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import Observation
+from unconstrain.diagnostics.information import Information
+from unconstrain.diagnostics.spectrum import compute_directions, compute_shares
+from unconstrain.fitting.observation import observe
 from unconstrain.parallel import cut_blocks
 from unconstrain.policies.base import Policy
+from unconstrain.samples import Samples
 
 NUMBERS_IN_BLOCK = 2**20
 
 TOLERANCE = 0.005
-"""Of the policy's directions, the share that may be lost by dropping episodes."""
+"""Share of the policy's directions that may be lost by dropping episodes."""
 
 
 @dataclass(frozen=True)
 class Contribution:
-    """episode: its label. directions: how many of the determined ones it holds, softly counted.
+    """What one episode contributes.
 
-    droppable: one of those without which, all together, the same is determined.
+    Parameters
+    ----------
+    episode : hashable
+        Its label.
+    directions : float
+        How many of the determined directions it holds, counted softly.
+    droppable : bool
+        Whether it is among the episodes that can be dropped together without loss.
     """
 
-    episode: object
+    episode: Hashable
     directions: float
     droppable: bool
 
 
-def contributions(
-    policy: Policy,
-    information: Information,
-    X: np.ndarray,
-    observation: Observation,
-    weights: np.ndarray,
-    episodes: np.ndarray,
-    threshold: float,
+def compute_contributions(
+    policy: Policy, information: Information, samples: Samples, episodes: np.ndarray, threshold: float
 ) -> list[Contribution]:
-    """Of every episode, the largest first; samples X (N, n), what is seen of them, weights (N,), episodes (N,)."""
-    labels, number = np.unique(episodes, return_inverse=True)
-    held = np.bincount(
-        number, leverages(policy, information, X, observation, weights, threshold), len(labels)
-    )
-    order = np.argsort(held)
+    """Compute what every episode contributes.
 
-    def determined(without: int) -> float:
-        rows = np.flatnonzero(np.isin(number, order[:without]))
-        left = information.moments
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    information : Information
+        Of these samples.
+    samples : Samples
+        Checked; each has motion or a known projection.
+    episodes : ndarray of shape (N,)
+        The episode of each sample.
+    threshold : float
+        The least λ of a determined direction, τ.
+
+    Returns
+    -------
+    list of Contribution
+        The largest first.
+    """
+    labels, number = np.unique(episodes, return_inverse=True)
+    held = np.bincount(number, compute_leverages(policy, information, samples, threshold), len(labels))
+    order = np.argsort(held)
+    observation = observe("inconsistency", samples.actions, samples.projections)
+
+    def determined_without(n_dropped: int) -> float:
+        rows = np.flatnonzero(np.isin(number, order[:n_dropped]))
+        left = information
         if len(rows):
-            dropped = stacked(policy.model_.moments(X[rows], observation[rows], weights[rows]))
-            left = Moments(left.H - dropped.H, left.g, left.squares, left.weight, left.n_samples)
-        return float(np.mean(np.concatenate(shares_seen(Information(left, information.whole))) >= threshold))
+            weights = None if samples.weights is None else samples.weights[rows]
+            dropped = policy.model_.moments(samples.states[rows], observation[rows], weights)
+            H = information.moments.H - dropped.H
+            left = replace(information, moments=replace(information.moments, H=H))
+        return float(np.mean(np.concatenate(compute_shares(left)) >= threshold))
 
     # The fewer are left, the less is determined: the most that may go is found by halving.
-    enough, fewest, too_many = determined(0) - TOLERANCE, 0, len(labels)
+    enough, fewest, too_many = determined_without(0) - TOLERANCE, 0, len(labels)
     while too_many - fewest > 1:
         middle = (fewest + too_many) // 2
-        if determined(middle) >= enough:
+        if determined_without(middle) >= enough:
             fewest = middle
         else:
             too_many = middle
@@ -71,22 +93,36 @@ def contributions(
     return [Contribution(labels[k], float(held[k]), k in droppable) for k in order[::-1].tolist()]
 
 
-def leverages(
-    policy: Policy,
-    information: Information,
-    X: np.ndarray,
-    observation: Observation,
-    weights: np.ndarray,
-    threshold: float,
+def compute_leverages(
+    policy: Policy, information: Information, samples: Samples, threshold: float
 ) -> np.ndarray:
-    """`ω tr(V A Vᵀ)` of every sample, (N,)."""
-    roots = [one.vectors / np.sqrt(one.seen + threshold) for one in directions(information)]  # A = R Rᵀ
+    """Compute the leverage `ω tr(V A Vᵀ)` of every sample.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    information : Information
+        Of these samples.
+    samples : Samples
+        Checked; each has motion or a known projection.
+    threshold : float
+        Threshold τ of `A = (H + τG)⁻¹`.
+
+    Returns
+    -------
+    ndarray of shape (N,)
+        Leverages, which add up to the number of determined directions.
+    """
+    # A = R Rᵀ
+    roots = [one.vectors / np.sqrt(one.shares + threshold) for one in compute_directions(information)]
+    X, observation = samples.states, observe("inconsistency", samples.actions, samples.projections)
     result = np.zeros(len(X))
     width = max(root.shape[1] for root in roots) + information.moments.H.shape[-1]
     for rows in cut_blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
-        looked, reached = observation[rows].rows, policy.model_.reach(X[rows])
+        Q, reach = observation[rows].rows, policy.model_.reach(X[rows])
         for k in range(observation.n_rows):
-            V = policy.model_.along(X[rows], looked[:, k])
-            for root, weight in zip(roots, reached.T, strict=True):
+            V = policy.model_.along(X[rows], Q[:, k])
+            for root, weight in zip(roots, reach.T, strict=True):
                 result[rows] += weight * np.sum((V @ root) ** 2, axis=1)
-    return result * weights
+    return result if samples.weights is None else result * samples.weights

@@ -2,8 +2,8 @@
 
 For features linear in the parameters, `π(x) = Φ(x) w`,
 
-    H = Σ ω VᵀV,   V = Q Φ     what was seen: along û, or behind a known projection
-    G = Σ ω ΦᵀΦ                what would have been seen had nothing been in the way
+    H = Σ ω VᵀV,   V = Q Φ     what was observed: along û, or behind a known projection
+    G = Σ ω ΦᵀΦ                what would have been observed without any constraint
 
 Q is a projection, so 0 <= H <= G. Samples without motion and without a known projection count in neither.
 
@@ -15,131 +15,95 @@ nothing but H, knows G as well.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from unconstrain.arrays import check_actions, check_projections, check_states, check_weights
-from unconstrain.errors import DataError, PolicyError
+from unconstrain.errors import PolicyError
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import informative, observe
-from unconstrain.motion import moving
+from unconstrain.fitting.observation import observe
 from unconstrain.policies.base import Policy
+from unconstrain.samples import Samples
 
 
 @dataclass(frozen=True)
 class Information:
-    """Moments of S models side by side (one, or all local models), and their G.
+    """The moments of S models, and what full observation would have shown of each.
 
-    moments: what was seen, with a leading axis S.
-    whole: G (S, P, P), or where the action's dimensions share it a block (S, P / d, P / d).
+    Parameters
+    ----------
+    moments : Moments
+        What was observed, as the policy's model sums it: with a leading axis of models where there are several.
+    whole : ndarray of shape (S, P, P) or (S, P / d, P / d)
+        G of each model; where all actions share a basis the block of which G has d copies on its diagonal.
     """
 
     moments: Moments
     whole: np.ndarray
 
+    @classmethod
+    def from_samples(cls, policy: Policy, samples: Samples) -> "Information":
+        """Sum samples up under a fitted policy's features.
+
+        Parameters
+        ----------
+        policy : Policy
+            Fitted. Its own risk does not matter.
+        samples : Samples
+            Checked; each has motion or a known projection.
+
+        Returns
+        -------
+        Information
+            Of these samples.
+        """
+        model, X, U, weights = policy.model_, samples.states, samples.actions, samples.weights
+        moments = model.moments(X, observe("inconsistency", U, samples.projections), weights)
+        if samples.projections is None and model.shares_basis:
+            return cls(moments, _sum_diagonal_blocks(moments.H, policy.n_actions_))
+        whole = model.moments(X, observe("direct", U), weights).H
+        return cls(moments, whole.reshape(-1, *whole.shape[-2:]))
+
+    @classmethod
+    def from_fit(cls, policy: Policy) -> "Information":
+        """Take the information in all that a policy was fitted to from its moments alone.
+
+        Parameters
+        ----------
+        policy : Policy
+            Fitted.
+
+        Returns
+        -------
+        Information
+            Of all samples so far.
+
+        Raises
+        ------
+        PolicyError
+            The moments do not hold G: for features without a shared basis, for the direct risk, or where projections
+            were known.
+        """
+        if not policy.model_.shares_basis or policy.risk == "direct" or policy.n_known_constraints_:
+            raise PolicyError(
+                "the moments of this policy do not say what full observation would have shown: give the recordings, "
+                "identifiability(policy, X, U)"
+            )
+        moments = policy.resume().moments()
+        return cls(moments, _sum_diagonal_blocks(moments.H, policy.n_actions_))
+
+    @property
+    def observed(self) -> np.ndarray:
+        """H of each model, an array of shape (S, P, P)."""
+        return self.moments.H.reshape(len(self), *self.moments.H.shape[-2:])
+
     @property
     def copies(self) -> int:
-        """How many copies of the block `whole` make up G."""
+        """How many copies of a block of `whole` make up G."""
         return self.moments.H.shape[-1] // self.whole.shape[-1]
 
     def __len__(self) -> int:
         return len(self.whole)
 
 
-def of_recordings(
-    policy: Policy,
-    X: ArrayLike,
-    U: ArrayLike,
-    sample_weight: ArrayLike | None = None,
-    projections: ArrayLike | None = None,
-) -> tuple[Information, np.ndarray]:
-    """Return the information in recordings, under a fitted policy's features.
-
-    Parameters
-    ----------
-    policy : Policy
-        Its own risk does not matter: the recordings show what they show.
-    X : array (N, n)
-        States.
-    U : array (N, d)
-        Actions.
-    sample_weight : array (N,), optional
-        Weights of the samples.
-    projections : array (N, d, d), optional
-        NaN where not known.
-
-    Returns
-    -------
-    information : Information
-        Of all models.
-    counted : array (N,) of bool
-        Which samples say something.
-
-    Raises
-    ------
-    DataError
-        The arrays do not fit the policy, or nothing moves.
-    """
-    states, actions = check_states(policy, X), check_actions(U)
-    if actions.shape != (len(states), policy.n_actions_):
-        raise DataError(
-            f"these recordings have {len(states)} states and actions of shape {actions.shape}, and the policy has "
-            f"{policy.n_actions_} actions: give one row of them for each state"
-        )
-    weights = check_weights(sample_weight, states)
-    counted, known = moving(actions), None
-    if projections is not None:
-        known = check_projections(projections, *actions.shape, unknown=True)
-        counted |= informative(known)
-    counted &= weights > 0
-    if not counted.any():
-        raise DataError("nothing moves in these recordings, so they say nothing about a policy")
-    states, actions, weights = states[counted], actions[counted], weights[counted]
-    model = policy.model_
-    observation = observe("inconsistency", actions, None if known is None else known[counted])
-    moments = stacked(model.moments(states, observation, weights))
-    if projections is None and model.shares_basis:
-        return Information(moments, _traced(moments.H, policy.n_actions_)), counted
-    return Information(
-        moments, stacked(model.moments(states, observe("direct", actions), weights)).H
-    ), counted
-
-
-def of_fit(policy: Policy) -> Information:
-    """Return the information in all that a fitted policy has learnt from, by its moments alone.
-
-    Parameters
-    ----------
-    policy : Policy
-        Fitted.
-
-    Returns
-    -------
-    Information
-        Of all models.
-
-    Raises
-    ------
-    PolicyError
-        The moments do not hold G: for features without a shared basis, for the direct risk, or where projections were
-        known.
-    """
-    moments = stacked(policy.resume().moments())
-    if not policy.model_.shares_basis or policy.risk == "direct" or policy.n_known_constraints_:
-        raise PolicyError(
-            "the moments of this policy do not say what full observation would have shown: give the recordings, "
-            "identifiability(policy, X, U)"
-        )
-    return Information(moments, _traced(moments.H, policy.n_actions_))
-
-
-def stacked(moments: Moments) -> Moments:
-    """Moments with a leading axis of models, also where there is only one."""
-    if moments.H.ndim == 3:
-        return moments
-    alone = (moments.H[None], moments.g[None], np.reshape(moments.squares, 1), np.reshape(moments.weight, 1))
-    return Moments(*alone, moments.n_samples)
-
-
-def _traced(H: np.ndarray, d: int) -> np.ndarray:
-    blocks = H.reshape(len(H), d, H.shape[-1] // d, d, H.shape[-1] // d)
+def _sum_diagonal_blocks(H: np.ndarray, d: int) -> np.ndarray:
+    """Sum the d diagonal blocks of H (..., P, P): (S, P / d, P / d)."""
+    blocks = H.reshape(-1, d, H.shape[-1] // d, d, H.shape[-1] // d)
     return np.einsum("sjajb->sab", blocks)

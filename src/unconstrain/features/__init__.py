@@ -1,4 +1,4 @@
-"""Feature maps: policies that are linear in their parameters, seen along a direction."""
+"""Feature maps: policies that are linear in their parameters."""
 
 from unconstrain.features.base import Compilable, Features, FullBasis
 from unconstrain.features.decoupled import DecoupledFeatures

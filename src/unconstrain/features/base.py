@@ -1,8 +1,8 @@
-"""The protocol: a policy that is linear in its parameters is a feature map seen along a direction.
+"""The protocol: a policy that is linear in its parameters is a feature map taken along a direction.
 
-For any policy `π(x) = Φ(x) w`, with `Φ` the d x P matrix of features, an observer who looks along a direction q sees
-`qᵀπ(x) = v(x, q)ᵀ w` with `v = Φᵀ q`. Learning needs nothing but `v`; full, decoupled and potential features differ
-in nothing else.
+For any policy `π(x) = Φ(x) w`, with `Φ` the d x P matrix of features, an observation along a direction q is
+`qᵀπ(x) = v(x, q)ᵀ w` with `v = Φᵀ q`. Learning needs only `v`, and only in `v` do full, decoupled and potential
+features differ.
 
 A feature map has three methods, and may have more. Each further method is a capability, which is there or is not:
 
@@ -11,7 +11,7 @@ A feature map has three methods, and may have more. Each further method is a cap
 | `fit(X, d)`                     | yes    | a policy, once, before any sample is added                                |
 | `along(X, directions)`          | yes    | everything that adds up samples or measures uncertainty                   |
 | `evaluate(X, w)`                | yes    | `predict`                                                                 |
-| `basis(X)`                      | no     | the fast ways of adding up: it says that `π(x) = W b(x)` with W free      |
+| `basis(X)`                      | no     | the fast kernels: it says that `π(x) = W b(x)` with W free      |
 | `compile(w)`                    | no     | `policy.compile()`, for the control loop                                  |
 
 `fit` may take `sample_weight` as a third argument.
@@ -46,12 +46,12 @@ class Features(Protocol):
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
         """
         ...
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the features along one direction at each state.
+        """Compute the features along one direction at each state.
 
         Parameters
         ----------
@@ -68,7 +68,7 @@ class Features(Protocol):
         ...
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the actions of the policy.
+        """Evaluate the policy.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class FullBasis(Features, Protocol):
     """A feature map whose policy is `π(x) = W b(x)`, W (d, M) free, with parameters in the order of W's rows."""
 
     def basis(self, X: np.ndarray) -> np.ndarray:
-        """Return the basis that all actions share.
+        """Compute the basis that all actions share.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class Compilable(Protocol):
     """A feature map that can be compiled for a control loop."""
 
     def compile(self, w: np.ndarray) -> "CompiledPolicy":
-        """Return the policy with these parameters, as arrays.
+        """Turn the policy with these parameters into arrays.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class Compilable(Protocol):
         Returns
         -------
         CompiledPolicy
-            Ready to be called.
+            That agrees with `evaluate`.
 
         Raises
         ------
@@ -136,18 +136,18 @@ def is_feature_map(candidate: object) -> bool:
     Parameters
     ----------
     candidate : object
-        Anything.
+        Any.
 
     Returns
     -------
     bool
-        True for an object, not a class, that has them.
+        False for classes.
     """
     return isinstance(candidate, Features) and not isinstance(candidate, type)
 
 
 def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray | None = None) -> Features:
-    """Return a copy of a feature map, fitted.
+    """Fit a copy of a feature map.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray
     Returns
     -------
     Features
-        The copy.
+        The fitted copy.
     """
     copy = clone(features, safe=False)
     weighted = sample_weight is not None and has_fit_parameter(copy, "sample_weight")
@@ -172,7 +172,7 @@ def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray
 
 
 def fit_transformer(transformer: Any, X: np.ndarray, sample_weight: np.ndarray | None = None) -> Any:
-    """Return a copy of a scikit-learn transformer, fitted.
+    """Fit a copy of a scikit-learn transformer.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def fit_transformer(transformer: Any, X: np.ndarray, sample_weight: np.ndarray |
     Returns
     -------
     transformer
-        The copy.
+        The fitted copy.
     """
     weighted = sample_weight is not None and has_fit_parameter(transformer, "sample_weight")
     return clone(transformer).fit(X, **({"sample_weight": sample_weight} if weighted else {}))

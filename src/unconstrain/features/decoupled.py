@@ -1,12 +1,12 @@
 """Decoupled features: each joint's policy depends on that joint alone, `π_j(x) = w_jᵀ b_j(x_j)`.
 
-With the parameters of the n actions one after the other, what is seen along q is
+With the parameters of the n actions one after the other, an observation along q has the features
 `v = (q_1 b_1(x_1), ..., q_n b_n(x_n))`: n k parameters where full features on the same splines have n² k. An action
 seen along one direction then tells much more about each, and from the same data far more is learnt, if the policy is of
 this kind; springs, attractors and joint-limit avoidance in joint space are.
 
-The weight decay is to mean smoothness: a plain λ‖w‖² would pull splines that few samples touch, at the ends of the
-range, to zero, and the policy would break off there. So the parameters are the second differences of the splines'
+The weight decay should make policies smooth. A plain λ‖w‖² would pull splines that few samples touch, at the ends of
+the range, to zero, and the policy would break off there. So the parameters are the second differences of the splines'
 coefficients, and a little of a straight line (P-splines); where there are no data, the policy goes on straight.
 
 References
@@ -83,12 +83,12 @@ class DecoupledFeatures(BaseEstimator):
         d : int
             Dimension of the actions.
         sample_weight : array (N,), optional
-            Weights of the samples.
+            Weight of each sample, 1 by default.
 
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
 
         Raises
         ------
@@ -117,14 +117,14 @@ class DecoupledFeatures(BaseEstimator):
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the features along one direction at each state.
+        """Compute the features along one direction at each state.
 
         Parameters
         ----------
         X : array (N, n)
             States.
         directions : array (N, n)
-            One direction a state, of any length.
+            One for each state, of any length.
 
         Returns
         -------
@@ -136,7 +136,7 @@ class DecoupledFeatures(BaseEstimator):
         return V.reshape(len(X), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the actions of the policy.
+        """Evaluate the policy.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class DecoupledFeatures(BaseEstimator):
         return np.einsum("njk,jk->nj", self._splines(X), w.reshape(self.n_actions_, -1))
 
     def _splines(self, X: np.ndarray) -> np.ndarray:
-        """`b_j(x_j)`, seen from the parameters: (N, n, k)."""
+        """Compute the functions whose weights the parameters are, (N, n, k)."""
         return self.splines_.transform(X).reshape(*X.shape, -1) @ self.to_coefficients_
 
 

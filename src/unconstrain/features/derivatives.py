@@ -23,8 +23,19 @@ BASES = (NormalizedRBF, SplineTransformer, PolynomialFeatures)
 EXTRAPOLATIONS = ("constant", "linear", "continue")
 
 
-def check_differentiable(basis: object) -> None:
-    """Raise a `PolicyError` for a basis whose derivative is not known here."""
+def check_differentiable(basis: Any) -> None:
+    """Check that the derivative of a basis is known here.
+
+    Parameters
+    ----------
+    basis : transformer
+        Fitted or not.
+
+    Raises
+    ------
+    PolicyError
+        It is not.
+    """
     if not isinstance(basis, BASES):
         raise PolicyError(
             f"a potential needs the gradient of its basis, known for {', '.join(b.__name__ for b in BASES)}, "
@@ -38,13 +49,29 @@ def check_differentiable(basis: object) -> None:
 
 
 def slopes(basis: Any, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """`qᵀ∇b_i(x)` of a fitted basis at states X (N, n) along directions (N, n): (N, M)."""
+    """Compute the slopes `qᵀ∇b_i(x)` of a basis along one direction at each state.
+
+    Parameters
+    ----------
+    basis : transformer
+        Fitted; one that `check_differentiable` accepts.
+    X : array (N, n)
+        States.
+    directions : array (N, n)
+        One for each state, of any length.
+
+    Returns
+    -------
+    array (N, M)
+        Slopes of the M basis functions.
+    """
     if isinstance(basis, NormalizedRBF):
         B = normalized_activations(X, basis.centers_, basis.width_)
         pulls = directions @ basis.centers_.T
         pulls -= np.einsum("nm,nm->n", B, pulls)[:, None]
         B *= pulls
-        B /= basis.width_**2
+        B /= basis.width_  # twice: σ² may be more or less than double precision holds
+        B /= basis.width_
         return B
     if isinstance(basis, SplineTransformer):
         return (_spline_slopes(basis, X) * directions[:, :, None]).reshape(len(X), -1)
@@ -53,11 +80,26 @@ def slopes(basis: Any, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
 
 
 def gradient(basis: Any, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """`∇ wᵀb(x)` of a fitted basis at states X (N, n), for w (M,): (N, n)."""
+    """Compute the gradient `∇ wᵀb(x)` of a weighted sum of basis functions.
+
+    Parameters
+    ----------
+    basis : transformer
+        Fitted; one that `check_differentiable` accepts.
+    X : array (N, n)
+        States.
+    w : array (M,)
+        Weights of the basis functions.
+
+    Returns
+    -------
+    array (N, n)
+        The gradient at each state.
+    """
     if isinstance(basis, NormalizedRBF):
         B = normalized_activations(X, basis.centers_, basis.width_)
         heights = B @ w
-        return ((B * (w - heights[:, None])) @ basis.centers_) / basis.width_**2
+        return ((B * (w - heights[:, None])) @ basis.centers_) / basis.width_ / basis.width_
     if isinstance(basis, SplineTransformer):
         return np.einsum("njk,jk->nj", _spline_slopes(basis, X), w.reshape(X.shape[1], -1))
     powers, table = basis.powers_, _power_table(X, basis.powers_)
@@ -65,7 +107,7 @@ def gradient(basis: Any, X: np.ndarray, w: np.ndarray) -> np.ndarray:
 
 
 def _spline_slopes(basis: SplineTransformer, X: np.ndarray) -> np.ndarray:
-    """`b_i'(x_j)`, (N, n, k)."""
+    """Compute `b_i'(x_j)`, (N, n, k)."""
     columns = []
     for spline, x in zip(basis.bsplines_, X.T, strict=True):
         low, high = spline.t[spline.k], spline.t[-spline.k - 1]
@@ -80,12 +122,12 @@ def _spline_slopes(basis: SplineTransformer, X: np.ndarray) -> np.ndarray:
 
 
 def _power_table(X: np.ndarray, powers: np.ndarray) -> list[np.ndarray]:
-    """`x_j^p` for p from 0 to the highest power, an array (N, p + 1) for each dimension."""
+    """Compute `x_j^p` for p from 0 to the highest power, an array (N, p + 1) for each dimension."""
     return [np.vander(x, powers.max(initial=0) + 1, increasing=True) for x in X.T]
 
 
 def _partial(table: list[np.ndarray], powers: np.ndarray, k: int) -> np.ndarray:
-    """`∂/∂x_k` of every monomial, (N, M)."""
+    """Compute `∂/∂x_k` of every monomial, (N, M)."""
     result = powers[:, k] * table[k][:, np.maximum(powers[:, k] - 1, 0)]
     for j, column in enumerate(table):
         if j != k:

@@ -1,7 +1,7 @@
 """Full features: every action has its own weights on one shared basis, `π(x) = W b(x)`.
 
-With the parameters in the order of W's rows, `w = vec(Wᵀ)`, what is seen along q is `v = q ⊗ b(x)`, and a sum of
-`v vᵀ` is a sum of `(q qᵀ) ⊗ (b bᵀ)`: symmetric in both factors. `fitting.kernels` makes use of that.
+With the parameters in the order of W's rows, `w = vec(Wᵀ)`, an observation along q has the features `v = q ⊗ b(x)`,
+and a sum of `v vᵀ` is a sum of `(q qᵀ) ⊗ (b bᵀ)`: symmetric in both factors. `fitting.kernels` makes use of that.
 
 References
 ----------
@@ -35,7 +35,7 @@ class FullFeatures(BaseEstimator):
     Raises
     ------
     PolicyError
-        The transformer is none.
+        `transformer` is not a transformer.
     """
 
     def __init__(self, transformer: Any = None):
@@ -62,7 +62,7 @@ class FullFeatures(BaseEstimator):
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
         """
         self.transformer_ = (
             None if self.transformer is None else fit_transformer(self.transformer, X, sample_weight)
@@ -71,7 +71,7 @@ class FullFeatures(BaseEstimator):
         return self
 
     def basis(self, X: np.ndarray) -> np.ndarray:
-        """Return the basis that all actions share.
+        """Compute the basis that all actions share.
 
         Parameters
         ----------
@@ -92,14 +92,14 @@ class FullFeatures(BaseEstimator):
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the features along one direction at each state.
+        """Compute the features along one direction at each state.
 
         Parameters
         ----------
         X : array (N, n)
             States.
         directions : array (N, d)
-            One direction a state, of any length.
+            One for each state, of any length.
 
         Returns
         -------
@@ -109,7 +109,7 @@ class FullFeatures(BaseEstimator):
         return (directions[:, :, None] * self.basis(X)[:, None, :]).reshape(len(X), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the actions of the policy.
+        """Evaluate the policy.
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class FullFeatures(BaseEstimator):
 
 
 def as_features(given: Any) -> Features:
-    """Return the feature map that an argument `features=` stands for, not fitted yet.
+    """Make the feature map that an argument `features=` stands for.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def as_features(given: Any) -> Features:
     Returns
     -------
     Features
-        A feature map of its own, which may be fitted.
+        Not fitted yet.
 
     Raises
     ------

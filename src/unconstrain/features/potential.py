@@ -1,8 +1,8 @@
 """Potential features: the policy goes down a potential, `π(x) = -∇Φ(x)` with `Φ(x) = wᵀ b(x)`.
 
-What is seen along q is `v = -J_b(x) q`, the slopes of the basis functions down that direction. One function of the
-state has to explain all n actions, where full features have a function for each: reaching, avoiding and resting
-movements are often of this kind. What circulates, such as a limit cycle, is not.
+An observation along q has the features `v = -J_b(x) q`, the slopes of the basis functions down that direction. One
+function of the state has to explain all n actions, where full features have a function for each: reaching, avoiding and
+resting movements are often of this kind. A policy that circulates, such as a limit cycle, is not.
 """
 
 from typing import Any
@@ -65,7 +65,7 @@ class PotentialFeatures(BaseEstimator):
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
 
         Raises
         ------
@@ -79,14 +79,14 @@ class PotentialFeatures(BaseEstimator):
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return the features along one direction at each state.
+        """Compute the features along one direction at each state.
 
         Parameters
         ----------
         X : array (N, n)
             States.
         directions : array (N, n)
-            One direction a state, of any length.
+            One for each state, of any length.
 
         Returns
         -------
@@ -97,7 +97,7 @@ class PotentialFeatures(BaseEstimator):
         return np.negative(V, out=V)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the actions of the policy.
+        """Evaluate the policy.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class PotentialFeatures(BaseEstimator):
         return actions
 
     def potential(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the potential, up to a constant.
+        """Evaluate the potential, up to a constant.
 
         Parameters
         ----------

@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_number, check_states, check_weights
-from unconstrain.features.centers import place
+from unconstrain.features.centers import place_centers
 from unconstrain.receptive import normalized_activations
 
 
@@ -37,9 +37,9 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
     Attributes
     ----------
     centers_ : array (M, n)
-        Centres, as placed.
+        The centres.
     width_ : float
-        σ, in the unit of the states.
+        The width σ, in the states' unit.
 
     Examples
     --------
@@ -74,12 +74,12 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         y : None
             Ignored.
         sample_weight : array (N,), optional
-            Weights of the samples.
+            Weight of each sample, 1 by default.
 
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
 
         Raises
         ------
@@ -91,7 +91,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         X = check_states(self, X, reset=True)
         weights = check_weights(sample_weight, X)
         X, weights = X[weights > 0], weights[weights > 0]
-        self.centers_, self.width_ = place(
+        self.centers_, self.width_ = place_centers(
             X,
             self.centers,
             n_centers=self.n_centers,
@@ -103,7 +103,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         return self
 
     def transform(self, X: ArrayLike) -> np.ndarray:
-        """Return the basis functions at states, finite however far a state is from all centres.
+        """Compute the basis functions at states, finite however far a state is from all centres.
 
         Parameters
         ----------
@@ -119,17 +119,17 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         return normalized_activations(check_states(self, X), self.centers_, self.width_)
 
     def get_feature_names_out(self, input_features: Any = None) -> np.ndarray:
-        """One name for each centre: rbf0, rbf1, ...
+        """Name the outputs rbf0, rbf1, ..., one for each centre.
 
         Parameters
         ----------
-        input_features : ignored
-            For scikit-learn.
+        input_features : None
+            Ignored.
 
         Returns
         -------
         array (M,) of str
-            A name for each basis function.
+            Names.
         """
         check_is_fitted(self)
         return np.array([f"rbf{i}" for i in range(len(self.centers_))], dtype=object)

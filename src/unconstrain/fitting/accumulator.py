@@ -37,7 +37,7 @@ class Solution:
     w : array (P,) or (S, P)
         Parameters of the model, or of each of S models.
     alpha : float
-        λ.
+        The weight decay λ.
     alphas, held_out_risk : array (L,), optional
         The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
     n_samples, n_zero, n_known : int
@@ -59,9 +59,9 @@ class Accumulator:
     Parameters
     ----------
     model : Model
-        Whose parameters are looked for.
+        What samples are summed under.
     risk : {"inconsistency", "direct"}
-        What is taken from an action.
+        What a sample says of the policy.
     alpha : float or "cv"
         The weight decay λ; "cv" chooses it by held-out risk, which keeps the sums of each fold apart.
     longest : float
@@ -108,34 +108,36 @@ class Accumulator:
         self.include(self.sums(samples, self.deal(samples)))
 
     def deal(self, samples: Samples) -> np.ndarray | None:
-        """Return the fold of each sample, (N,); new episodes are dealt out. None where λ is a number.
+        """Deal new episodes out to folds.
 
         Parameters
         ----------
         samples : Samples
-            With or without episode labels.
+            Checked.
 
         Returns
         -------
         array (N,) of int or None
-            The folds.
+            The fold of each sample; None where λ is a number.
         """
         return None if self.folds is None else self.folds.assign(samples.groups, len(samples.states))
 
     def sums(self, samples: Samples, fold: np.ndarray | None = None) -> Sums:
-        """Return what samples add. Changes nothing, so threads may call it side by side.
+        """Compute what samples add.
+
+        The accumulator stays as it is, so threads may call this side by side.
 
         Parameters
         ----------
         samples : Samples
-            In any number.
+            Checked.
         fold : array (N,) of int, optional
             From `deal`.
 
         Returns
         -------
         Sums
-            By fold.
+            Moments by fold, and counts.
 
         Raises
         ------
@@ -147,7 +149,7 @@ class Accumulator:
         longest = max(float(r.max(initial=0.0)), self.longest)
         moves = r > NO_MOTION * longest
         _check_outlier(r, moves)
-        counted = informative_samples(self.risk, samples, moves)
+        counted = self.find_informative(samples, moves)
         observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
         for k in [0] if fold is None else np.unique(fold[counted]).tolist():
@@ -169,7 +171,7 @@ class Accumulator:
         Parameters
         ----------
         sums : Sums
-            As `sums` returned them.
+            From `sums`.
         """
         self.total = self.total + sums
 
@@ -188,7 +190,7 @@ class Accumulator:
         self.include(sums)
 
     def empty(self, known_folds: dict | None = None, longest: float | None = None) -> "Accumulator":
-        """Return an accumulator of the same model and options to which nothing was added.
+        """Make an accumulator of the same model and options to which nothing was added.
 
         Parameters
         ----------
@@ -200,7 +202,7 @@ class Accumulator:
         Returns
         -------
         Accumulator
-            Without sums.
+            Empty.
         """
         folds = None if self.folds is None else EpisodeFolds(self.folds.n_folds, known_folds)
         return Accumulator(
@@ -208,7 +210,7 @@ class Accumulator:
         )
 
     def copy(self) -> "Accumulator":
-        """Return an independent accumulator with the same sums, which never change themselves.
+        """Copy the accumulator; the copies share their sums, which never change themselves.
 
         Returns
         -------
@@ -221,20 +223,43 @@ class Accumulator:
         return other
 
     def without_labels(self) -> "Accumulator":
-        """Return the same sums and number of episodes, without the episodes' labels: what needs to travel.
+        """Copy the sums and the number of episodes, without the episodes' labels.
+
+        Labels need not travel between machines.
 
         Returns
         -------
         Accumulator
-            A smaller copy.
+            With the same sums.
         """
         other = self.copy()
         if other.folds is not None:
             other.folds.fold_of.clear()
         return other
 
+    def find_informative(self, samples: Samples, moves: np.ndarray) -> np.ndarray:
+        """Find the samples that say something of the policy.
+
+        Parameters
+        ----------
+        samples : Samples
+            Checked.
+        moves : array (N,) of bool
+            Which of them move.
+
+        Returns
+        -------
+        array (N,) of bool
+            True where one does.
+        """
+        if self.risk == "direct":
+            says = np.ones_like(moves)
+        else:
+            says = moves if samples.projections is None else moves | informative(samples.projections)
+        return says if samples.weights is None else says & (samples.weights > 0)
+
     def moments(self, without: int | None = None) -> Moments:
-        """Return the sum over all folds, or all but one.
+        """Add up all folds, or all but one.
 
         Parameters
         ----------
@@ -249,7 +274,7 @@ class Accumulator:
         Raises
         ------
         DataError
-            There is none.
+            There is nothing to learn from.
         """
         return Moments.sum(self._folds(without))
 
@@ -259,14 +284,14 @@ class Accumulator:
         Parameters
         ----------
         alpha : float or "cv", optional
-            λ, or "cv" where the sums were kept by fold. By default as at the beginning.
+            The weight decay λ, or "cv" where the sums were kept by fold. By default as at the beginning.
         without : int, optional
             A fold to leave out; λ is then chosen among the others. It costs no pass over the data.
 
         Returns
         -------
         Solution
-            Parameters, and how λ was chosen.
+            The parameters, and what their choice was based on.
 
         Raises
         ------

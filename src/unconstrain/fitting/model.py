@@ -32,17 +32,17 @@ class Model(Protocol):
 
     @property
     def n_states(self) -> int:
-        """Number n of states."""
+        """Number of states n."""
         ...
 
     @property
     def n_actions(self) -> int:
-        """Number d of actions."""
+        """Number of actions d."""
         ...
 
     @property
     def n_models(self) -> int:
-        """How many sets of parameters there are, S."""
+        """Number S of sets of parameters, each of which is fitted by itself."""
         ...
 
     @property
@@ -51,31 +51,125 @@ class Model(Protocol):
         ...
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
-        """Return the sums of samples at states X (N, n) with weights (N,); stacked where there are several models."""
+        """Sum samples up.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        observation : Observation
+            Of N samples.
+        weights : array (N,), optional
+            Weight of each sample, 1 by default.
+
+        Returns
+        -------
+        Moments
+            With a leading axis of models where there are several.
+        """
         ...
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
-        """Return a solution w (..., P / K, K) of the moments as parameters, (P,) or (S, P)."""
+        """Turn a solution of the moments into parameters.
+
+        Parameters
+        ----------
+        w : array (..., P / K, K)
+            A solution of the moments.
+
+        Returns
+        -------
+        array (P,) or (S, P)
+            Parameters.
+        """
         ...
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the policy with parameters w at states X (N, n): (N, d)."""
+        """Evaluate the policy.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (P,) or (S, P)
+            Parameters.
+
+        Returns
+        -------
+        array (N, d)
+            Actions.
+        """
         ...
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
-        """Second moments (N, d, d) of the true policy about predictions P (N, d) at states X (N, n)."""
+        """Compute second moments of the true policy about predictions.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        P : array (N, d)
+            Predictions.
+        posterior : Posterior
+            Of the parameters.
+
+        Returns
+        -------
+        array (N, d, d)
+            In squared units of the action.
+        """
         ...
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """`Φ(x)ᵀq` of any of the models, (N, P), for states X (N, n) and directions (N, d)."""
+        """Compute the features `Φ(x)ᵀq` along one direction at each state, the same for all models.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, d)
+            One for each state, of any length.
+
+        Returns
+        -------
+        array (N, P)
+            Features.
+        """
         ...
 
     def reach(self, X: np.ndarray) -> np.ndarray:
-        """How much of a sample at X (N, n) reaches each model, (N, S)."""
+        """Compute how much of a sample reaches each model.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+
+        Returns
+        -------
+        array (N, S)
+            Weights, 0 to 1.
+        """
         ...
 
     def compile(self, w: np.ndarray) -> Any:
-        """Compile the policy with parameters w."""
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : array (P,) or (S, P)
+            Parameters.
+
+        Returns
+        -------
+        CompiledPolicy
+            That agrees with `evaluate`.
+
+        Raises
+        ------
+        PolicyError
+            These features cannot be compiled.
+        """
         ...
 
 
@@ -88,7 +182,7 @@ class GlobalModel:
     features : Features
         Fitted.
     n_states, n_actions : int
-        n and d.
+        Numbers n and d.
     """
 
     features: Features
@@ -97,7 +191,7 @@ class GlobalModel:
 
     @property
     def n_models(self) -> int:
-        """One."""
+        """One set of parameters."""
         return 1
 
     @property
@@ -106,34 +200,73 @@ class GlobalModel:
         return isinstance(self.features, FullBasis)
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
-        """Return the sums of samples.
+        """Sum samples up.
 
         Parameters
         ----------
         X : array (N, n)
             States, of any precision.
         observation : Observation
-            What the recorded actions say.
+            Of N samples.
         weights : array (N,), optional
-            Weights of the samples.
+            Weight of each sample, 1 by default.
 
         Returns
         -------
         Moments
-            Their sums.
+            Of N samples.
         """
         return parametric.moments(self.features, X, observation, weights)
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
-        """Return a solution w (P / K, K) of the moments as parameters (P,)."""
+        """Turn a solution of the moments into parameters.
+
+        Parameters
+        ----------
+        w : array (P / K, K)
+            A solution of the moments.
+
+        Returns
+        -------
+        array (P,)
+            Parameters.
+        """
         return w.T.reshape(-1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the policy with parameters w (P,) at states X (N, n): (N, d)."""
+        """Evaluate the policy.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (P,)
+            Parameters.
+
+        Returns
+        -------
+        array (N, d)
+            Actions.
+        """
         return self.features.evaluate(X, w)
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
-        """Second moments (N, d, d) of the true policy about predictions P (N, d) at states X (N, n)."""
+        """Compute second moments of the true policy about predictions.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        P : array (N, d)
+            Predictions.
+        posterior : Posterior
+            Of the parameters.
+
+        Returns
+        -------
+        array (N, d, d)
+            In squared units of the action.
+        """
         bias = self.features.evaluate(X, self.parameters(posterior.mean)) - P
         result = bias[:, :, None] * bias[:, None, :]
         for start in range(0, len(X), COVARIANCE_ROWS):
@@ -142,15 +275,55 @@ class GlobalModel:
         return result
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """`Φ(x)ᵀq`, (N, P), for states X (N, n) and directions (N, d)."""
+        """Compute the features `Φ(x)ᵀq` along one direction at each state.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, d)
+            One for each state, of any length.
+
+        Returns
+        -------
+        array (N, P)
+            Features.
+        """
         return self.features.along(X, directions)
 
     def reach(self, X: np.ndarray) -> np.ndarray:
-        """Ones, (N, 1): every sample reaches the model whole."""
+        """Return ones, since every sample reaches the model in full.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+
+        Returns
+        -------
+        array (N, 1)
+            Ones.
+        """
         return np.ones((len(X), 1))
 
     def compile(self, w: np.ndarray) -> Any:
-        """Compile the policy with parameters w (P,). Raises `PolicyError` where the features cannot be compiled."""
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : array (P,)
+            Parameters.
+
+        Returns
+        -------
+        CompiledPolicy
+            That agrees with `evaluate`.
+
+        Raises
+        ------
+        PolicyError
+            These features cannot be compiled.
+        """
         if not isinstance(self.features, Compilable):
             raise PolicyError(
                 f"a policy with {type(self.features).__name__} features cannot be compiled, since they have no method "
@@ -159,7 +332,7 @@ class GlobalModel:
         return self.features.compile(w)
 
     def _spread(self, X: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-        """`Φ(x) Σ Φ(x)ᵀ`, (N, d, d)."""
+        """Compute `Φ(x) Σ Φ(x)ᵀ`, (N, d, d)."""
         d = self.n_actions
         if isinstance(self.features, FullBasis):
             return _spread_of_basis(self.features.basis(X), covariance, d)
@@ -183,11 +356,11 @@ class LocalModels:
     features : Features
         Fitted; the same for every model.
     centers : array (M, n)
-        Centres of the models.
+        Centres of the receptive fields.
     width : float
-        σ, in the states' unit.
+        Width σ of the receptive fields, in the states' unit.
     n_actions : int
-        d.
+        Number d.
 
     References
     ----------
@@ -201,12 +374,12 @@ class LocalModels:
 
     @property
     def n_states(self) -> int:
-        """Number n of states."""
+        """Number of states n."""
         return self.centers.shape[1]
 
     @property
     def n_models(self) -> int:
-        """M."""
+        """Number of models M."""
         return len(self.centers)
 
     @property
@@ -215,30 +388,54 @@ class LocalModels:
         return isinstance(self.features, FullBasis)
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
-        """Return the sums of samples, stacked along a leading axis of M models.
+        """Sum samples up.
 
         Parameters
         ----------
         X : array (N, n)
             States, of any precision.
         observation : Observation
-            What the recorded actions say.
+            Of N samples.
         weights : array (N,), optional
-            Weights of the samples.
+            Weight of each sample, 1 by default.
 
         Returns
         -------
         Moments
-            Their sums.
+            With a leading axis of M models.
         """
         return local.moments(self.features, self.centers, self.width, X, observation, weights)
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
-        """Return a solution w (M, P / K, K) of the moments as parameters (M, P)."""
+        """Turn a solution of the moments into parameters.
+
+        Parameters
+        ----------
+        w : array (M, P / K, K)
+            A solution of the moments.
+
+        Returns
+        -------
+        array (M, P)
+            Parameters.
+        """
         return w.swapaxes(-1, -2).reshape(len(w), -1)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the policy with parameters w (M, P) at states X (N, n): (N, d)."""
+        """Evaluate the policy.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (M, P)
+            Parameters.
+
+        Returns
+        -------
+        array (N, d)
+            Actions.
+        """
         actions = np.zeros((len(X), self.n_actions))
         for start in range(0, len(X), BLOCK_ROWS):
             block = X[start : start + BLOCK_ROWS]
@@ -248,10 +445,24 @@ class LocalModels:
         return actions
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
-        """Second moments (N, d, d) of the mixture of the models about predictions P (N, d) at states X (N, n).
+        """Compute second moments of the mixture of the models about predictions.
 
         Neighbours learn from shared samples, so their errors do not average out. By convexity the mixture's second
         moment is an upper bound on that of the blend, however the models depend on each other.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        P : array (N, d)
+            Predictions.
+        posterior : Posterior
+            Of the parameters.
+
+        Returns
+        -------
+        array (N, d, d)
+            In squared units of the action.
         """
         d, w = self.n_actions, self.parameters(posterior.mean)
         result = np.empty((len(X), d, d))
@@ -266,15 +477,55 @@ class LocalModels:
         return result
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """`Φ(x)ᵀq` of any of the models, (N, P), for states X (N, n) and directions (N, d)."""
+        """Compute the features `Φ(x)ᵀq` along one direction at each state, the same for all models.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, d)
+            One for each state, of any length.
+
+        Returns
+        -------
+        array (N, P)
+            Features.
+        """
         return self.features.along(X, directions)
 
     def reach(self, X: np.ndarray) -> np.ndarray:
-        """Return the activations K_m(x), (N, M)."""
+        """Compute the activations K_m(x).
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+
+        Returns
+        -------
+        array (N, M)
+            Activations, 0 to 1.
+        """
         return activations(X, self.centers, self.width)
 
     def compile(self, w: np.ndarray) -> Any:
-        """Compile the policy with parameters w (M, P). Raises `PolicyError` unless its models are linear."""
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : array (M, P)
+            Parameters.
+
+        Returns
+        -------
+        CompiledPolicy
+            That agrees with `evaluate`.
+
+        Raises
+        ------
+        PolicyError
+            The local models are not linear.
+        """
         from unconstrain.deploy.compiled import LocallyLinear
 
         linear = self.linear_parameters(w)
@@ -285,14 +536,25 @@ class LocalModels:
         return LocallyLinear(centers=self.centers, width=self.width, coef=linear[0], intercept=linear[1])
 
     def linear_parameters(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Slopes (M, d, n) and offsets (M, d) of local models on the features (x, 1); None for other features."""
+        """Split the parameters of linear local models into slopes and offsets.
+
+        Parameters
+        ----------
+        w : array (M, P)
+            Parameters.
+
+        Returns
+        -------
+        tuple of array (M, d, n) and array (M, d), or None
+            Slopes and offsets; None for features other than (x, 1).
+        """
         if getattr(self.features, "transformer_", w) is not None:
             return None
         models = w.reshape(len(w), self.n_actions, -1)
         return models[:, :, :-1].copy(), models[:, :, -1].copy()
 
     def _evaluate_each(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Return the actions of every model, (N, M, d)."""
+        """Evaluate every model, (N, M, d)."""
         M, d = len(w), self.n_actions
         if isinstance(self.features, FullBasis):
             B = self.features.basis(X)
@@ -300,7 +562,7 @@ class LocalModels:
         return np.stack([self.features.evaluate(X, each) for each in w], axis=1)
 
     def _mixed_spread(self, posterior: Posterior) -> Any:
-        """Return a function of states (N, n) and blend (N, M) that returns `Σ_m ω_m Φ Σ_m Φᵀ`, (N, d, d)."""
+        """Make a function of states (N, n) and blend (N, M) that returns `Σ_m ω_m Φ Σ_m Φᵀ`, (N, d, d)."""
         M, d = self.n_models, self.n_actions
         if not isinstance(self.features, FullBasis):
             one = GlobalModel(self.features, self.n_states, d)
@@ -337,7 +599,7 @@ class LocalModels:
 
 
 def _spread_of_basis(B: np.ndarray, covariance: np.ndarray, d: int) -> np.ndarray:
-    """`(I ⊗ bᵀ) Σ (I ⊗ b)`, (N, d, d), for a basis B (N, M)."""
+    """Compute `(I ⊗ bᵀ) Σ (I ⊗ b)`, (N, d, d), for a basis B (N, M)."""
     M = B.shape[1]
     if len(covariance) == M:  # shared by all actions
         return np.einsum("nm,nm->n", B @ covariance, B)[:, None, None] * np.eye(d)

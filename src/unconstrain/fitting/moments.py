@@ -1,6 +1,6 @@
 """The sufficient statistics of a fit, and its solution.
 
-For any policy linear in its parameters, `pi(x) = Φ(x) w`, any of the risks is
+For any policy linear in its parameters, `π(x) = Φ(x) w`, any of the risks is
 
     E(w) = Σ_n ω_n ‖Q_n u_n - V_n w‖² = s - 2 gᵀw + wᵀH w,        V_n = Q_n Φ(x_n)
     H = Σ ω_n V_nᵀ V_n,    g = Σ ω_n V_nᵀ Q_n u_n,    s = Σ ω_n ‖Q_n u_n‖²
@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike
 from unconstrain.parallel import cut_blocks, map_shares
 from unconstrain.storage import Kind, load_object, save_object
 
-# λ relative to the mean eigenvalue of H. What rounding leaves of g where H is silent is then divided by enough to stay
-# a millionth of the policy.
+# λ relative to the mean eigenvalue of H. Rounding errors of g along directions where H is zero are then divided by
+# enough to stay a millionth of the policy.
 CLEAR_OF_ROUNDING = 1e-10
 
 
@@ -40,7 +40,7 @@ class Moments:
     g : array (..., P, K)
         K = 1, except for problems that share one H: the d dimensions of the action when nothing is projected.
     squares : array (...,)
-        The sums s, in squared units of the action.
+        Sum s, in squared units of the action.
     weight : array (...,)
         `Σ ω_n`.
     n_samples : int
@@ -55,7 +55,7 @@ class Moments:
 
     @classmethod
     def zeros(cls, batch: tuple[int, ...], n_parameters: int, n_targets: int) -> "Moments":
-        """Return the moments of no data.
+        """Make the moments of no data.
 
         Parameters
         ----------
@@ -67,7 +67,7 @@ class Moments:
         Returns
         -------
         Moments
-            All zero.
+            Zeros.
         """
         return cls(
             H=np.zeros((*batch, n_parameters, n_parameters)),
@@ -112,7 +112,7 @@ class Moments:
 
     @staticmethod
     def sum(parts: Iterable["Moments"]) -> "Moments":
-        """Return the moments of all parts' data together.
+        """Add moments up.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Moments:
         return total
 
     def risk(self, w: np.ndarray) -> np.ndarray:
-        """Return the risk of candidates, `E(w) = s - 2 gᵀw + wᵀHw`, summed over samples.
+        """Compute the risk of candidates, `E(w) = s - 2 gᵀw + wᵀHw`, summed over samples.
 
         Parameters
         ----------
@@ -149,7 +149,7 @@ class Moments:
         return np.maximum(error + self.squares[..., None], 0.0)
 
     def solve(self, alpha: float) -> np.ndarray:
-        """Return the solution `w = (H + λI)⁺ g` of least norm for one λ.
+        """Solve for `w = (H + λI)⁺ g` of least norm for one λ.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class Moments:
         Returns
         -------
         array (..., P, K)
-            Parameters, a column for each right-hand side.
+            Parameters.
 
         Notes
         -----
@@ -173,12 +173,12 @@ class Moments:
         return self.decompose().solve([alpha])[..., 0, :]
 
     def decompose(self) -> "Spectrum":
-        """Return the eigendecomposition of H, which solves for every λ at once.
+        """Decompose H into eigenvectors, which solves for every λ at once.
 
         Returns
         -------
         Spectrum
-            Eigenvalues and eigenvectors.
+            Of H and g.
         """
         if self.H.ndim == 2:
             values, vectors = np.linalg.eigh(self.H)
@@ -224,7 +224,7 @@ class Spectrum:
         return self.values > np.maximum(floor, 0.0)
 
     def solve(self, alphas: ArrayLike) -> np.ndarray:
-        """Return the solutions `w = (H + λI)⁺ g` of least norm.
+        """Solve for `w = (H + λI)⁺ g` of least norm for several λ.
 
         Parameters
         ----------
@@ -234,7 +234,7 @@ class Spectrum:
         Returns
         -------
         array (..., P, L, K)
-            Parameters for each λ, a column for each right-hand side.
+            Parameters for each λ.
         """
         alphas = np.asarray(alphas, dtype=np.float64)
         determined = self.determined[..., None]

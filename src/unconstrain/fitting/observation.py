@@ -1,4 +1,4 @@
-"""What a recorded action says of the policy.
+"""Observations: what a recorded action says of the policy.
 
 Every risk is a sum of squared errors behind projections,
 
@@ -177,12 +177,12 @@ class AlongMotion:
 
 
 def unknown(projections: np.ndarray) -> np.ndarray:
-    """Which projections are not known.
+    """Find the projections that are not known.
 
     Parameters
     ----------
     projections : array (N, d, d)
-        Nullspace projections.
+        NaN where not known.
 
     Returns
     -------
@@ -193,12 +193,12 @@ def unknown(projections: np.ndarray) -> np.ndarray:
 
 
 def informative(projections: np.ndarray) -> np.ndarray:
-    """Which projections say something of the policy even where nothing moves.
+    """Find the projections that say something of the policy even where nothing moves.
 
     Parameters
     ----------
     projections : array (N, d, d)
-        Nullspace projections.
+        NaN where not known.
 
     Returns
     -------
@@ -211,7 +211,7 @@ def informative(projections: np.ndarray) -> np.ndarray:
 def observe(
     risk: str, U: np.ndarray, projections: np.ndarray | None = None, r: np.ndarray | None = None
 ) -> Observation:
-    """Return what a risk takes from recorded actions.
+    """Take from recorded actions what a risk uses.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def observe(
     Returns
     -------
     Observation
-        Of all samples.
+        Of N samples.
     """
     d = U.shape[1]
     if risk == "direct":
@@ -248,7 +248,7 @@ def observe(
 
 
 def squared_errors(observation: Observation, P: np.ndarray) -> np.ndarray:
-    """Return the error of predictions behind the observation's projections.
+    """Compute the squared error of predictions behind the observation's projections.
 
     Parameters
     ----------

@@ -37,13 +37,13 @@ class Posterior:
     Parameters
     ----------
     mean : array (..., P, K)
-        m.
+        Means m.
     covariance : array (..., P, P)
         Σ, of each of the K targets that share H.
     noise : array (...,)
-        σ², in squared units of the action.
+        Variance σ² of the noise, in squared units of the action.
     decay : array (...,)
-        λ.
+        Weight decay λ.
     log_evidence : array (...,)
         `log p(data | λ, σ²)`.
     """
@@ -56,7 +56,7 @@ class Posterior:
 
     @classmethod
     def of(cls, moments: Moments, numbers_per_sample: int = 1) -> "Posterior":
-        """Return the posterior that moments determine.
+        """Compute the posterior that moments determine.
 
         Parameters
         ----------
@@ -107,17 +107,18 @@ class _Evidence:
         self.every = np.arange(len(self.squares))
 
     def noise(self, log_decay: np.ndarray, models: np.ndarray) -> np.ndarray:
-        """σ² of the largest likelihood for λ, never below the rounding of s."""
+        """Compute σ² of the largest likelihood for λ, never below the rounding of s."""
         explained = self.pulls[models] / (self.values[models] + np.exp(log_decay)[..., None])
         return np.maximum(self.squares[models] - explained.sum(axis=-1), self.floor[models]) / self.n[models]
 
     def surprise(self, log_decay: np.ndarray, models: np.ndarray) -> np.ndarray:
+        """Compute `-log p(data | λ)`."""
         shrunk = np.sum(np.log1p(self.values[models] * np.exp(-log_decay)[..., None]), axis=-1)
         misfit = np.log(2 * np.pi * self.noise(log_decay, models)) + 1.0
         return 0.5 * (self.n[models] * misfit + self.n_targets * shrunk)
 
     def decay(self) -> np.ndarray:
-        """λ of the largest evidence, (S,): the best of a coarse grid, then refined between its neighbours."""
+        """Find λ of the largest evidence, (S,): the best of a coarse grid, then refined between its neighbours."""
         from scipy.optimize import elementwise
 
         top = np.where(self.values[:, -1] > 0, self.values[:, -1], 1.0)

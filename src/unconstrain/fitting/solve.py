@@ -13,8 +13,8 @@ N_ALPHAS = 25
 # λ from one that flattens the policy to one at the resolution of H, relative to H's largest eigenvalue.
 SMALLEST, LARGEST = 1e-12, 1e0
 # Candidates whose held-out risk is within this share of the least cannot be told apart, and the largest is taken:
-# where no sample shows a direction the risk is flat over many decades of λ, and a small λ would leave there whatever
-# slight misfits happen to ask for, many times the policy.
+# where no sample shows a direction the risk is flat over many decades of λ, and with a small λ slight misfits would
+# determine the parameters there, at many times the size of the policy.
 INDISTINGUISHABLE = 0.01
 
 ONE_FOLD = (
@@ -27,7 +27,7 @@ class EpisodeFolds:
     """Deals episodes out to folds: the i-th new episode goes to fold i mod n_folds, and stays there.
 
     The rule needs no knowledge of what is yet to come, so a stream is dealt out as the whole would be. Samples
-    without episodes are cut into contiguous blocks, since neighbouring samples tell too much about each other.
+    without episodes are cut into contiguous blocks, since neighbouring samples are too much alike.
 
     Parameters
     ----------
@@ -79,12 +79,18 @@ class EpisodeFolds:
         Parameters
         ----------
         n_episodes : int
-            How many to count.
+            How many.
         """
         self.n_dealt += n_episodes
 
     def copy(self) -> "EpisodeFolds":
-        """Return the same folds, to be dealt to independently."""
+        """Copy the folds, to deal to them independently.
+
+        Returns
+        -------
+        EpisodeFolds
+            With the same episodes.
+        """
         other = EpisodeFolds(self.n_folds, self.fold_of)
         other.n_dealt = self.n_dealt
         return other
@@ -115,7 +121,7 @@ class EpisodeFolds:
 
 
 def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return the λ with the least risk on folds left out one at a time, or the largest that is as good.
+    """Choose the λ with the least risk on folds left out one at a time, or the largest that is as good.
 
     Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
     each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added.
@@ -156,7 +162,7 @@ def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndar
 
 
 def splits(n_samples: int, groups: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows to train on and rows to test on, dealt out as `EpisodeFolds` does.
+    """Split rows into those to train on and those to test on, as `EpisodeFolds` deals them out.
 
     Parameters
     ----------

@@ -52,19 +52,19 @@ class Sums:
         )
 
     def rotated(self, by: int, n_folds: int) -> "Sums":
-        """Return the same sums, with fold k renamed to fold (k + by) mod n_folds.
+        """Rename fold k to fold (k + by) mod n_folds.
 
         Parameters
         ----------
         by : int
-            How many folds further.
+            By how many.
         n_folds : int
             Number of folds.
 
         Returns
         -------
         Sums
-            A copy.
+            Of the same samples.
         """
         moments: list[Moments | None] = [None] * n_folds
         for fold, part in enumerate(self.moments):

@@ -1,4 +1,4 @@
-"""How far recordings determine a policy: its standard deviation over the states, and the spectrum of what was seen."""
+"""How far recordings determine a policy: its standard deviation over the states, and its spectrum."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ SHOWN = 600
 
 
 def identifiability_figure(report: Identifiability, state_names: Sequence[str]) -> Figure:
-    """Draw the standard deviation of a policy over the recorded region, and the spectrum of what was seen.
+    """Draw the standard deviation of a policy over the recorded region, and the spectrum of observed shares.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ def identifiability_figure(report: Identifiability, state_names: Sequence[str]) 
     Figure
         Over two states and two actions: the standard deviation as a field, with ellipses. Otherwise: recorded states,
         projected onto pairs of the first three coordinates, coloured by the largest standard deviation in any
-        direction. And the share of the policy's directions that were seen at least so much.
+        direction. And the share of the policy's directions of which at least so much was observed.
     """
-    X = report.recordings_for("where to draw").X
+    X = report.require_samples("where to draw").states
     n, d = X.shape[1], report.policy.n_actions_
     pairs = [(0, 1), (0, 2), (1, 2)] if n > 2 else [(0, 1)] if n == 2 else [(0, 0)]
     figure = Figure(figsize=(4.6 * (len(pairs) + 1), 4.4), layout="constrained")
@@ -52,7 +52,8 @@ def identifiability_figure(report: Identifiability, state_names: Sequence[str]) 
     last.axvline(report.threshold, color=TRUE, ls="--", lw=1)
     last.set_xscale("log")
     last.set(
-        xlabel="share of a direction that was seen", ylabel="share of directions seen at least that much"
+        xlabel="share of a direction that was observed",
+        ylabel="share of directions observed at least that much",
     )
     last.set_title(f"determined: {report.determined_share:.1%}", fontsize=10.5)
     last.set_ylim(0, 1.02)
@@ -101,8 +102,8 @@ def standard_deviation(
     ax.figure.colorbar(
         shown, ax=ax, label="units of the action", format="%.2g", ticks=decades if len(decades) > 1 else None
     )
-    if report.recordings is not None:
-        trajectory(report.recordings.X, episodes=report.recordings.episodes, color="white", ax=ax)
+    if report.samples is not None:
+        trajectory(report.samples.states, episodes=report.episodes, color="white", ax=ax)
     _draw_ellipses(ax, report, low, high)
     ax.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x1", ylabel="x2")
     return ax

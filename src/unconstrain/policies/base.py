@@ -31,6 +31,7 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import moving
+from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.samples import Samples
 from unconstrain.storage import Kind, save_object
 
@@ -75,12 +76,12 @@ class Policy(RegressorMixin, BaseEstimator):
         d : int
             Dimension of the actions.
         sample_weight : array (N,)
-            Weights of the samples.
+            Weight of each sample.
 
         Returns
         -------
         Model
-            Its places fixed by the samples.
+            That samples are summed under.
 
         Raises
         ------
@@ -121,7 +122,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
 
         Raises
         ------
@@ -131,7 +132,7 @@ class Policy(RegressorMixin, BaseEstimator):
             An option is impossible.
         """
         fresh = copy(self)
-        samples, scalars = fresh.check_data(X, y, groups, sample_weight, projections, first=True)
+        samples, scalars = _check_input(fresh, X, y, groups, sample_weight, projections, first=True)
         accumulator = fresh.start(samples)
         accumulator.add(samples)
         return self._adopt_from(fresh, accumulator, scalars)
@@ -154,20 +155,20 @@ class Policy(RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X : array (N, n), or Demonstrations
-            States, and more, as for `fit`.
+            States.
         y : array (N, d) or (N,)
             Actions.
         groups : array (N,), optional
             Episode labels.
         sample_weight : array (N,), optional
-            Weights of the samples.
+            Weight of each sample, 1 by default.
         projections : array (N, d, d), optional
-            Nullspace projections, all NaN where not known.
+            The nullspace projection of each sample, all NaN where it is not known.
 
         Returns
         -------
         self
-            Itself, fitted to all samples so far.
+            Fitted.
 
         Raises
         ------
@@ -178,7 +179,7 @@ class Policy(RegressorMixin, BaseEstimator):
             return self.fit(X, y, groups=groups, sample_weight=sample_weight, projections=projections)
         accumulator = self.resume()
         fresh = copy(self)
-        samples, _ = fresh.check_data(X, y, groups, sample_weight, projections, first=False)
+        samples, _ = _check_input(fresh, X, y, groups, sample_weight, projections, first=False)
         accumulator.longest = max(accumulator.longest, accumulator.total.longest)
         accumulator.add(samples)
         if accumulator.total.misjudged:
@@ -189,17 +190,17 @@ class Policy(RegressorMixin, BaseEstimator):
         return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
 
     def start(self, samples: Samples) -> Accumulator:
-        """Return an empty accumulator for this policy's options, its model placed by some samples.
+        """Make an accumulator for this policy's options, its model placed by some samples.
 
         Parameters
         ----------
         samples : Samples
-            Checked. Those that say nothing do not count in placing.
+            Checked. Those without motion or a known projection do not count in placing.
 
         Returns
         -------
         Accumulator
-            To which samples may be added.
+            Empty.
 
         Raises
         ------
@@ -210,7 +211,8 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         self.check_options()
         X, U, weights = samples.states, samples.actions, samples.weights
-        counted = informative_samples(self.risk, samples, moving(U))
+        # Of an accumulator only the risk matters here.
+        counted = Accumulator(None, self.risk, 0.0).find_informative(samples, moving(U))  # type: ignore[arg-type]
         if not counted.any():
             raise DataError(NO_DIRECTION)
         weights = np.ones(len(X)) if weights is None else weights
@@ -218,12 +220,12 @@ class Policy(RegressorMixin, BaseEstimator):
         return Accumulator(model, self.risk, self.alpha)
 
     def resume(self) -> Accumulator:
-        """Return a copy of the sums that this policy was solved from, to be added to.
+        """Copy the sums that this policy was solved from, to add to them.
 
         Returns
         -------
         Accumulator
-            To which more samples may be added.
+            With the same sums.
 
         Raises
         ------
@@ -251,7 +253,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         self
-            Itself, fitted.
+            Fitted.
 
         Raises
         ------
@@ -265,7 +267,7 @@ class Policy(RegressorMixin, BaseEstimator):
     def predict(
         self, X: ArrayLike, return_std: bool = False, return_cov: bool = False
     ) -> Any:  # an array, or two of them
-        """Compute actions of the unconstrained policy.
+        """Predict actions of the unconstrained policy.
 
         Parameters
         ----------
@@ -306,7 +308,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return actions, spread
 
     def posterior(self) -> Posterior:
-        """Return what the samples say of the parameters and of their own noise. Costs an eigendecomposition.
+        """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
 
         Each sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
         more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
@@ -324,7 +326,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return Posterior.of(self.resume().moments(), self.n_actions_ if self.risk == "direct" else 1)
 
     def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:
-        """How far the true policy may be from `predict`.
+        """Compute how far the true policy may be from `predict`.
 
         Parameters
         ----------
@@ -344,7 +346,9 @@ class Policy(RegressorMixin, BaseEstimator):
         return self.model_.covariance(X, actions, self.posterior() if posterior is None else posterior)
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-        """Share of observed motion explained, `1 - Σ (r - û·π(x))² / Σ r²`, whatever risk the policy was fitted with.
+        """Compute the share of observed motion explained, `1 - Σ (r - û·π(x))² / Σ r²`.
+
+        It does not depend on the risk that the policy was fitted with.
 
         Parameters
         ----------
@@ -353,7 +357,7 @@ class Policy(RegressorMixin, BaseEstimator):
         y : array (N, d) or (N,)
             Actions.
         sample_weight : array (N,), optional
-            Weights of the samples.
+            Weight of each sample, 1 by default.
 
         Returns
         -------
@@ -399,7 +403,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Demonstrations
-            The movement, an episode for each start.
+            States, actions and time of every movement.
 
         Raises
         ------
@@ -433,7 +437,9 @@ class Policy(RegressorMixin, BaseEstimator):
         save_object(path, Kind.POLICY, kept, check_usable)
 
     def compile(self) -> "CompiledPolicy":
-        """Return the fitted policy for a control loop: `step = policy.compile()`; `step(x)` for states (n,) or (N, n).
+        """Compile the fitted policy for a control loop.
+
+        `step = policy.compile()`, then `step(x)` for states (n,) or (N, n).
 
         Returns
         -------
@@ -456,7 +462,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Parameters
         ----------
         path : path
-            The file.
+            The file; an existing one is replaced.
 
         Raises
         ------
@@ -469,7 +475,7 @@ class Policy(RegressorMixin, BaseEstimator):
         onnx.save(self.compile(), Path(path))
 
     def solved(self, *, without: int | None = None) -> Self:
-        """Return a copy of this fitted policy, solved anew for its `alpha`, without one fold if asked.
+        """Solve anew for `alpha`, if asked without the samples of one fold, in a copy of this policy.
 
         Parameters
         ----------
@@ -479,7 +485,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Policy
-            The copy.
+            The solved copy.
 
         Raises
         ------
@@ -554,70 +560,6 @@ class Policy(RegressorMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
 
-    def check_data(
-        self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
-    ) -> tuple[Samples, bool]:
-        """Check the options and the samples given to `fit`, and learn the number of states if they are the first.
-
-        Parameters
-        ----------
-        X : array_like of shape (N, n), or Demonstrations
-            States.
-        y : array_like of shape (N, d) or (N,), or None
-            Actions.
-        groups : array_like of shape (N,), or None
-            Episode labels.
-        sample_weight : array_like of shape (N,), or None
-            Weights of the samples.
-        projections : array_like of shape (N, d, d), or None
-            Nullspace projections, all NaN where not known.
-        first : bool
-            Whether these are the first samples.
-
-        Returns
-        -------
-        samples : Samples
-            As arrays that fit together.
-        scalars : bool
-            Whether actions were given as (N,).
-
-        Raises
-        ------
-        DataError
-            Arrays are not finite or do not fit together.
-        PolicyError
-            An option is impossible.
-        """
-        self.check_options()
-        if isinstance(X, Demonstrations):
-            X, y, groups, projections = self._of_demonstrations(X, y, groups, projections)
-        X, y = check_samples(self, X, y, reset=first, min_samples=2 if first else 1)
-        U = check_actions(y)
-        if not first and U.shape[1] != self.n_actions_:
-            raise DataError(
-                f"actions have {U.shape[1]} dimensions, but this policy has learnt {self.n_actions_}"
-            )
-        if projections is not None:
-            if self.risk == "direct":
-                raise PolicyError(
-                    'projections= are for risk="inconsistency", and this policy has risk="direct", which looks at the '
-                    "whole action"
-                )
-            projections = check_projections(projections, *U.shape, unknown=True)
-        weights = None if sample_weight is None else check_weights(sample_weight, X)
-        return Samples(X, U, check_groups(groups, len(X)), projections, weights), np.ndim(y) == 1
-
-    def _of_demonstrations(
-        self, demos: Demonstrations, y: Any, groups: Any, projections: Any
-    ) -> tuple[np.ndarray, np.ndarray, Any, Any]:
-        if y is not None:
-            raise DataError("demonstrations bring their own actions: give fit(demos), or fit(X, U)")
-        if groups is None and demos.n_episodes > 1:
-            groups = demos.episodes
-        if projections is None and self.risk != "direct":
-            projections = demos.projections
-        return demos.states, demos.actions, groups, projections
-
     def _adopt_from(self, fresh: Self, accumulator: Accumulator, scalars: bool) -> Self:
         """Become the policy that was prepared on a copy. Nothing here changes before all of it has succeeded."""
         fresh.model_, fresh.accumulator_ = accumulator.model, accumulator
@@ -627,6 +569,32 @@ class Policy(RegressorMixin, BaseEstimator):
         if not hasattr(fresh, "feature_names_in_") and hasattr(self, "feature_names_in_"):
             del self.feature_names_in_
         return self
+
+
+def _check_input(
+    policy: Policy, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
+) -> tuple[Samples, bool]:
+    """Check the samples, and whether actions are of shape (N,); store the number of states where `first`."""
+    policy.check_options()
+    asked = projections
+    X, y, groups, projections = unpack_demonstrations(X, y, groups, projections)
+    if policy.risk == "direct":  # has no use for projections that come along with demonstrations
+        projections = asked
+    X, y = check_samples(policy, X, y, reset=first, min_samples=2 if first else 1)
+    U = check_actions(y)
+    if not first and U.shape[1] != policy.n_actions_:
+        raise DataError(
+            f"actions have {U.shape[1]} dimensions, but this policy has learnt {policy.n_actions_}"
+        )
+    if projections is not None:
+        if policy.risk == "direct":
+            raise PolicyError(
+                'projections= are for risk="inconsistency", and this policy has risk="direct", which looks at the '
+                "whole action"
+            )
+        projections = check_projections(projections, *U.shape, unknown=True)
+    weights = None if sample_weight is None else check_weights(sample_weight, X)
+    return Samples(X, U, check_groups(groups, len(X)), projections, weights), np.ndim(y) == 1
 
 
 def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:
@@ -641,7 +609,7 @@ def check_usable(policy: Policy) -> None:
     Parameters
     ----------
     policy : Policy
-        As it was read.
+        Any.
 
     Raises
     ------

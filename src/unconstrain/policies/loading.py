@@ -25,7 +25,7 @@ def load_policy(path: str | PathLike[str], *, trusted: Iterable[Any] = ()) -> Po
     Returns
     -------
     Policy
-        A fitted one, found to answer.
+        Fitted; it was checked that it predicts.
 
     Raises
     ------

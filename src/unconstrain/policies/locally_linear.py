@@ -11,7 +11,7 @@ import numpy as np
 
 from unconstrain.arrays import check_number
 from unconstrain.features.base import Features, fit_features
-from unconstrain.features.centers import place as place_centers
+from unconstrain.features.centers import place_centers
 from unconstrain.features.full import as_features
 from unconstrain.fitting.model import LocalModels, Model
 from unconstrain.policies.base import Policy
@@ -45,9 +45,9 @@ class LocallyLinearPolicy(Policy):
     Attributes
     ----------
     centers_ : array (M, n)
-        Centres, as placed.
+        The centres of the receptive fields.
     width_ : float
-        σ, in the unit of the states.
+        Their width σ, in the states' unit.
     weights_ : array (M, P)
         The parameters of each model.
     coef_ : array (M, d, n)
@@ -89,12 +89,12 @@ class LocallyLinearPolicy(Policy):
         d : int
             Dimension of the actions.
         sample_weight : array (N,)
-            Weights of the samples.
+            Weight of each sample.
 
         Returns
         -------
         LocalModels
-            With centres and width.
+            Fitted, without parameters.
 
         Raises
         ------

@@ -24,8 +24,8 @@ class ParametricPolicy(Policy):
         Any scikit-learn transformer whose output is `b(x)` (`NormalizedRBF`, `SplineTransformer`, ...), shared by all
         actions; a feature map (see `features.base`); or None for the linear policy, `b(x) = (x, 1)`.
     risk : {"inconsistency", "direct"}
-        "inconsistency" learns from what each action says whatever the constraint was, and from the error under it where
-        its projection is known. "direct" is ordinary regression.
+        "inconsistency" learns from each action along its own direction, which no constraint can bend, and from the
+        error under the projection where that is known. "direct" is ordinary regression.
     alpha : "cv" or float
         The weight decay λ of `E(w) + λ‖w‖²`, with E the sum of squared errors over samples; "cv" chooses it by held-out
         risk among 25 values over five folds of episodes.
@@ -47,7 +47,7 @@ class ParametricPolicy(Policy):
     --------
     >>> import numpy as np, unconstrain as uc
     >>> X = np.random.default_rng(0).normal(size=(200, 2))
-    >>> Pi = X @ [[-1.0, 0.5], [-0.5, -1.0]]                      # the policy nobody ever sees whole
+    >>> Pi = X @ [[-1.0, 0.5], [-0.5, -1.0]]                      # the unconstrained policy
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
     >>> U = np.einsum("nij,nj->ni", N, Pi)                        # what is recorded
     >>> policy = uc.ParametricPolicy().fit(X, U)
@@ -70,17 +70,17 @@ class ParametricPolicy(Policy):
         d : int
             Dimension of the actions.
         sample_weight : array (N,)
-            Weights of the samples.
+            Weight of each sample.
 
         Returns
         -------
         GlobalModel
-            With features that are fitted.
+            Fitted, without parameters.
 
         Raises
         ------
         PolicyError
-            The features are none, or do not fit these dimensions.
+            `features` is not a feature map, or does not fit these dimensions.
         """
         features = fit_features(as_features(self.features), X, d, sample_weight)
         return GlobalModel(features, X.shape[1], d)

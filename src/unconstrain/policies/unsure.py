@@ -43,8 +43,10 @@ class Unsure:
 
         Returns
         -------
-        deviation, speed : array (N,)
-            In units of the action.
+        deviation : array (N,)
+            The root of the summed variances of all actions, in units of the action.
+        speed : array (N,)
+            Length of the predicted action.
         """
         P = np.reshape(self.policy.predict(X), (len(X), -1))
         variance = np.einsum("njj->n", self.policy.covariance(X, self.posterior))

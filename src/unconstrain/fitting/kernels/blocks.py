@@ -1,16 +1,24 @@
 """Sums over samples, in blocks that stay in the processor's cache and are shared out over threads."""
 
+import math
 import threading
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from unconstrain.memory import check_memory
 from unconstrain.parallel import cut_blocks, map_shares
 
 SAMPLES_IN_PIECE = 384
 """Block lengths are multiples of this; narrow products are taken in pieces of it (see `parametric`)."""
 
 Totals = list[np.ndarray]
+
+LARGE = 2**28
+"""Bytes of totals from which on it is asked whether there is memory for them."""
+
+WORK = 4
+"""How many times the size of its totals a fit takes: H is assembled from them, and decomposed."""
 
 _spaces = threading.local()
 
@@ -23,7 +31,7 @@ def sum_over_blocks(
     Parameters
     ----------
     n_samples : int
-        Number N of samples.
+        N.
     rows : int
         Samples in a block.
     shapes : sequence of shapes
@@ -35,7 +43,15 @@ def sum_over_blocks(
     -------
     list of array
         The totals.
+
+    Raises
+    ------
+    DataError
+        The totals, and what is computed from them, do not fit into memory.
     """
+    n_bytes = 8.0 * WORK * sum(math.prod(shape) for shape in shapes)
+    if n_bytes > LARGE:
+        check_memory(n_bytes, "a model with so many parameters", "choose fewer centres, knots or features")
 
     def share(of_blocks: Sequence[slice]) -> Totals:
         totals = [np.zeros(shape) for shape in shapes]
@@ -48,7 +64,7 @@ def sum_over_blocks(
 
 
 def rows_in_block(numbers: int, width: int) -> int:
-    """How many samples a block holds: few enough for the cache, enough to be worth a call.
+    """Choose how many samples a block holds: few enough for the cache, enough to be worth a call.
 
     Parameters
     ----------
@@ -60,14 +76,14 @@ def rows_in_block(numbers: int, width: int) -> int:
     Returns
     -------
     int
-        Rows of a block.
+        Samples in a block.
     """
     size = max(256, min(numbers // width, 11 * SAMPLES_IN_PIECE))
     return size - size % SAMPLES_IN_PIECE if size > SAMPLES_IN_PIECE else size
 
 
 def working_space(name: str, *shape: int) -> np.ndarray:
-    """Return this thread's own working space, its contents those of the block before.
+    """Get the working space of this thread, which still holds the block before.
 
     Memory new for every block would have to be mapped and cleared each time, which costs a fifth of the whole.
 
@@ -76,12 +92,12 @@ def working_space(name: str, *shape: int) -> np.ndarray:
     name : str
         What it is used for.
     *shape : int
-        Shape of the array.
+        Its shape.
 
     Returns
     -------
     array
-        Whose contents are arbitrary.
+        Of that shape.
     """
     held: np.ndarray | None = getattr(_spaces, name, None)
     if held is None or held.shape != shape:

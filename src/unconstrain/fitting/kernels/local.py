@@ -1,6 +1,6 @@
 """Moments of M local models at once.
 
-Each model sees the same samples, weighted by its own receptive field. Where features have a basis, every model weighs
+Each model sums the same samples, weighted by its own receptive field. Where features have a basis, every model weighs
 the same distinct products differently, so all of them together are one matrix product.
 """
 
@@ -36,22 +36,22 @@ def moments(
     observation: Observation,
     weights: np.ndarray | None = None,
 ) -> Moments:
-    """Moments of local models, each weighted by `exp(-‖x - c_m‖² / 2σ²)`.
+    """Sum the moments of local models, each weighted by `exp(-‖x - c_m‖² / 2σ²)`.
 
     Parameters
     ----------
     features : Features
         Fitted; the same for every model.
     centers : array (M, n)
-        Centres of the models.
+        The models' centres.
     width : float
-        σ, in the states' unit.
+        Width σ, in the states' unit.
     X : array (N, n)
         States.
     observation : Observation
         Of N samples.
     weights : array (N,), optional
-        Weights of the samples.
+        Weight of each sample, 1 by default.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def _of_rows(
 def _receptive(
     X: np.ndarray, centers: np.ndarray, width: float, weights: np.ndarray | None, block: slice
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weight (N, M) of each sample in each model, and which models (M,) any sample of the block reaches."""
+    """Compute the weight (N, M) of each sample in each model, and which models (M,) the block reaches."""
     receptive = activations(X, centers, width)
     near = receptive.max(axis=0) > NEGLIGIBLE
     if weights is not None:

@@ -31,7 +31,7 @@ NARROW = 2**12
 def moments(
     features: Features, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None
 ) -> Moments:
-    """Moments of a policy with these features.
+    """Sum the moments of a policy with these features.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def moments(
     observation : Observation
         Of N samples.
     weights : array (N,), optional
-        Weights of the samples.
+        Weight of each sample, 1 by default.
 
     Returns
     -------
@@ -64,7 +64,24 @@ def moments(
 def of_products(
     features: FullBasis, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None
 ) -> Moments:
-    """Moments as one product of distinct products; parameters as for `moments`."""
+    """Sum moments as one product of distinct products.
+
+    Parameters
+    ----------
+    features : FullBasis
+        Fitted.
+    X : array (N, n)
+        States.
+    observation : Observation
+        Of N samples.
+    weights : array (N,), optional
+        Weight of each sample, 1 by default.
+
+    Returns
+    -------
+    Moments
+        Of N samples.
+    """
     M, d = features.basis(X[:1]).shape[1], observation.n_actions
     size = rows_in_block(PRODUCTS_IN_BLOCK, n_pairs(M) + n_pairs(d))
 
@@ -87,7 +104,24 @@ def of_products(
 def of_whole_actions(
     features: FullBasis, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None
 ) -> Moments:
-    """Moments where nothing is projected: `H = (Σ ω b bᵀ) ⊗ I`; parameters as for `moments`."""
+    """Sum moments where nothing is projected, `H = (Σ ω b bᵀ) ⊗ I`.
+
+    Parameters
+    ----------
+    features : FullBasis
+        Fitted.
+    X : array (N, n)
+        States.
+    observation : Observation
+        Of N samples.
+    weights : array (N,), optional
+        Weight of each sample, 1 by default.
+
+    Returns
+    -------
+    Moments
+        Of the block `Σ ω b bᵀ`; g has d columns.
+    """
     M, d = features.basis(X[:1]).shape[1], observation.n_actions
 
     def add(block: slice, totals: Totals) -> None:
@@ -105,7 +139,24 @@ def of_whole_actions(
 def of_rows(
     features: Features, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None
 ) -> Moments:
-    """Moments of any features, as `VᵀV`; parameters as for `moments`."""
+    """Sum moments of any features, as `VᵀV`.
+
+    Parameters
+    ----------
+    features : Features
+        Fitted.
+    X : array (N, n)
+        States.
+    observation : Observation
+        Of N samples.
+    weights : array (N,), optional
+        Weight of each sample, 1 by default.
+
+    Returns
+    -------
+    Moments
+        Of N samples.
+    """
     P = features.along(X[:1].astype(np.float64, copy=False), np.ones((1, observation.n_actions))).shape[1]
 
     def add(block: slice, totals: Totals) -> None:
@@ -126,7 +177,7 @@ def of_rows(
 
 
 def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
-    """Compute `A Bᵀ` of long rows, A (a, N) and B (b, N), a piece of their length at a time.
+    """Multiply long rows, `A Bᵀ` of A (a, N) and B (b, N), a piece of their length at a time.
 
     BLAS copies both into the order in which it multiplies; where there are few rows that is half the work, and
     goes twice as fast while a piece fits the innermost cache.
@@ -144,7 +195,7 @@ def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 def _squares_and_weight(
     observation: Observation, weights: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`Σ ω ‖Q u‖²` and `Σ ω`."""
+    """Sum `ω ‖Q u‖²` and `ω`."""
     if weights is None:
         return np.asarray(observation.squares.sum()), np.asarray(float(len(observation)))
     return np.asarray(observation.squares @ weights), np.asarray(weights.sum())

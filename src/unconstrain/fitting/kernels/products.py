@@ -10,18 +10,53 @@ import numpy as np
 
 
 def n_pairs(k: int) -> int:
-    """How many products of k columns differ."""
+    """Count the distinct products of k columns.
+
+    Parameters
+    ----------
+    k : int
+        Number of columns.
+
+    Returns
+    -------
+    int
+        `k(k+1)/2`.
+    """
     return k * (k + 1) // 2
 
 
 def pairs(k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which columns (i, j) are multiplied, in the order of `distinct_products`: two arrays (k(k+1)/2,)."""
+    """List the pairs of columns in the order of `distinct_products`.
+
+    Parameters
+    ----------
+    k : int
+        Number of columns.
+
+    Returns
+    -------
+    i : array (k(k+1)/2,) of int
+        The first columns.
+    j : array (k(k+1)/2,) of int
+        The second columns.
+    """
     distance, i = np.divmod(np.arange(n_pairs(k)), k)
     return i, (i + distance) % k
 
 
 def pair_index(k: int) -> np.ndarray:
-    """Where the product of columns i and j stands among the distinct ones, (k, k)."""
+    """Find where the product of columns i and j stands among the distinct ones.
+
+    Parameters
+    ----------
+    k : int
+        Number of columns.
+
+    Returns
+    -------
+    array (k, k) of int
+        Indices into `distinct_products`.
+    """
     index = np.empty((k, k), dtype=np.intp)
     i, j = pairs(k)
     index[i, j] = index[j, i] = np.arange(len(i))
@@ -31,9 +66,21 @@ def pair_index(k: int) -> np.ndarray:
 def distinct_products(
     A: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """Products ω a_i a_j of the columns of A (N, k), weighted (N,): (k(k+1)/2, N), in the order of `pairs`.
+    """Multiply the columns of A with each other, `ω a_i a_j`.
 
-    `out` may hold them.
+    Parameters
+    ----------
+    A : array (N, k)
+        Columns.
+    weights : array (N,), optional
+        Weights ω, 1 by default.
+    out : array (k(k+1)/2, N), optional
+        Where they may be written.
+
+    Returns
+    -------
+    array (k(k+1)/2, N)
+        In the order of `pairs`.
     """
     N, k = A.shape
     ring = np.empty((k + k // 2, N))
@@ -54,14 +101,14 @@ def distinct_products(
 def observed_products(
     rows: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the distinct entries of `ω QᵀQ`.
+    """Compute the distinct entries of `ω QᵀQ`.
 
     Parameters
     ----------
     rows : array (N, k, d)
         Q.
     weights : array (N,), optional
-        ω.
+        Weights ω, 1 by default.
     out : array (d(d+1)/2, N), optional
         Where they may be written.
 
@@ -78,7 +125,7 @@ def observed_products(
 
 
 def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """`QᵀQ u`.
+    """Compute `QᵀQ u`.
 
     Parameters
     ----------
@@ -90,7 +137,7 @@ def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
     Returns
     -------
     array (N, d)
-        A pull a sample.
+        One for each sample.
     """
     if rows.shape[1] == 1:
         return rows[:, 0] * targets
@@ -98,19 +145,19 @@ def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
 
 def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
-    """Return the matrix H from its distinct entries.
+    """Assemble the matrix H from its distinct entries.
 
     Parameters
     ----------
     products : array (..., M(M+1)/2, d(d+1)/2)
-        Distinct entries.
+        Products of features, times products of directions.
     M, d : int
         Numbers of features and of actions.
 
     Returns
     -------
     array (..., dM, dM)
-        Symmetric matrices.
+        H.
     """
     over_q = products[..., pair_index(d)]  # (..., pairs of b, d, d)
     full = np.moveaxis(over_q, -3, -1)[..., pair_index(M)]  # (..., d, d, M, M)

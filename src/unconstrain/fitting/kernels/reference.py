@@ -10,7 +10,24 @@ from unconstrain.fitting.observation import Observation
 def moments(
     features: Features, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None
 ) -> Moments:
-    """`H = Σ ω VᵀV`, `g = Σ ω VᵀQu`, `s = Σ ω ‖Qu‖²` with `V = Q Φ(x)`; parameters as for `parametric.moments`."""
+    """Sum `H = Σ ω VᵀV`, `g = Σ ω VᵀQu`, `s = Σ ω ‖Qu‖²` with `V = Q Φ(x)`.
+
+    Parameters
+    ----------
+    features : Features
+        Fitted.
+    X : array (N, n)
+        States.
+    observation : Observation
+        Of N samples.
+    weights : array (N,), optional
+        Weight of each sample, 1 by default.
+
+    Returns
+    -------
+    Moments
+        Of N samples.
+    """
     omega = np.ones(len(X)) if weights is None else weights
     V = np.stack([features.along(X, observation.rows[:, k]) for k in range(observation.n_rows)], axis=1)
     H = np.einsum("n,nkp,nkq->pq", omega, V, V)

@@ -149,7 +149,7 @@ class Accumulator:
         longest = max(float(r.max(initial=0.0)), self.longest)
         moves = r > NO_MOTION * longest
         _check_outlier(r, moves)
-        counted = self.find_informative(samples, moves)
+        counted = find_informative_samples(self.risk, samples, moves)
         observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
         for k in [0] if fold is None else np.unique(fold[counted]).tolist():
@@ -237,27 +237,6 @@ class Accumulator:
             other.folds.fold_of.clear()
         return other
 
-    def find_informative(self, samples: Samples, moves: np.ndarray) -> np.ndarray:
-        """Find the samples that say something of the policy.
-
-        Parameters
-        ----------
-        samples : Samples
-            Checked.
-        moves : array (N,) of bool
-            Which of them move.
-
-        Returns
-        -------
-        array (N,) of bool
-            True where one does.
-        """
-        if self.risk == "direct":
-            says = np.ones_like(moves)
-        else:
-            says = moves if samples.projections is None else moves | informative(samples.projections)
-        return says if samples.weights is None else says & (samples.weights > 0)
-
     def moments(self, without: int | None = None) -> Moments:
         """Add up all folds, or all but one.
 
@@ -338,8 +317,8 @@ class Accumulator:
         return self.model.moments(X.T.take(index, axis=1).T, observation[index], taken)
 
 
-def informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> np.ndarray:
-    """Tell which samples say something of the policy.
+def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> np.ndarray:
+    """Find the samples that say something of the policy.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from unconstrain.arrays import (
 )
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, informative_samples
+from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS
@@ -211,8 +211,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         self.check_options()
         X, U, weights = samples.states, samples.actions, samples.weights
-        # Of an accumulator only the risk matters here.
-        counted = Accumulator(None, self.risk, 0.0).find_informative(samples, moving(U))  # type: ignore[arg-type]
+        counted = find_informative_samples(self.risk, samples, moving(U))
         if not counted.any():
             raise DataError(NO_DIRECTION)
         weights = np.ones(len(X)) if weights is None else weights

@@ -1,5 +1,7 @@
 """Laws of the errors, whatever the policy, the constraints and the unit."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -73,6 +75,20 @@ def test_shapes_that_do_not_match_are_told():
         risk.inconsistency(np.ones((3, 2)), np.ones((4, 2)))
     with pytest.raises(uc.errors.DataError, match=r"projections must have shape \(3, 2, 2\)"):
         risk.constrained_policy_error(np.ones((3, 2)), np.ones((3, 2)), np.eye(2))
+
+
+@given(problems(), st.floats(-3, 3), st.floats(0, 1))
+def test_knowing_projections_judges_more_of_a_policy_but_never_more_than_cpe(problem, exponent, share):
+    _, Pi, N, U, rng = problem
+    P = Pi + rng.normal(size=Pi.shape) * 10.0**exponent
+    slack = 1e-12 * (np.mean(Pi**2) + np.mean(P**2))
+    laws = [
+        risk.inconsistency(U, P),
+        risk.inconsistency(U, P, np.where(rng.random((len(N), 1, 1)) < share, np.nan, N)),
+        risk.constrained_policy_error(Pi, P, N),
+        risk.unconstrained_policy_error(Pi, P),
+    ]
+    assert all(a <= b + slack for a, b in pairwise(laws))
 
 
 @given(problems(), st.floats(0, 1))

@@ -1,14 +1,11 @@
-import os
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from unconstrain import atomic
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.errors import DataError
 
 
 def simulated(n_samples=12, n_episodes=3, seed=0):
@@ -174,64 +171,3 @@ def test_repr_tells_the_shape_of_things():
     )
     many = Demonstrations(np.ones((1, 30)), np.ones((1, 1)))
     assert repr(many) == "Demonstrations(1 sample in 1 episode; states x1, x2, x3, ..., x30 (30); actions u1)"
-
-
-def test_replacing_moves_into_place(tmp_path):
-    target = tmp_path / "out.txt"
-    with atomic.replacing(target) as temporary:
-        assert temporary.suffix == ".txt"
-        assert temporary.parent == tmp_path
-        temporary.write_text("new")
-        assert not target.exists()
-    assert target.read_text() == "new"
-    assert list(tmp_path.iterdir()) == [target]
-
-
-@pytest.mark.parametrize("trouble", [RuntimeError, KeyboardInterrupt])
-def test_replacing_leaves_the_old_file_on_any_exception(tmp_path, trouble):
-    target = tmp_path / "out.txt"
-    target.write_text("old")
-
-    def interrupted():
-        with atomic.replacing(target) as temporary:
-            temporary.write_text("half")
-            raise trouble
-
-    with pytest.raises(trouble):
-        interrupted()
-    assert target.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [target]
-
-
-def test_replacing_follows_links_and_keeps_the_mode(tmp_path):
-    real, link = tmp_path / "real.txt", tmp_path / "link.txt"
-    real.write_text("old")
-    real.chmod(0o640)
-    link.symlink_to(real)
-    with atomic.replacing(link) as temporary:
-        temporary.write_text("new")
-    assert link.is_symlink()
-    assert real.read_text() == "new"
-    assert real.stat().st_mode & 0o777 == 0o640
-
-
-def test_replacing_says_where_it_cannot_write(tmp_path, monkeypatch):
-    with (
-        pytest.raises(UnconstrainError, match="there is no folder"),
-        atomic.replacing(tmp_path / "a" / "b.txt"),
-    ):
-        pass
-    with pytest.raises(UnconstrainError, match="is not a file"), atomic.replacing(tmp_path):
-        pass
-    with (
-        pytest.raises(UnconstrainError, match="no space left"),
-        atomic.replacing(tmp_path / "full.txt"),
-    ):
-        raise OSError(28, "No space left on device")
-
-    def refuse(*_):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(os, "open", refuse)
-    with pytest.raises(UnconstrainError, match="permission denied"), atomic.replacing(tmp_path / "b.txt"):
-        pass

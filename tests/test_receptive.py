@@ -26,3 +26,18 @@ def test_the_widest_field_is_active_everywhere():
 
 def test_far_from_all_centres_the_nearest_is_left():
     np.testing.assert_allclose(normalized_activations(1e20 * X, C, 1.0).sum(axis=1), 1.0)
+
+
+@pytest.mark.parametrize("distance", [1e8, 1e20, 1e150, 1e200])
+def test_however_far_the_centre_in_that_direction_is_active(distance):
+    b = normalized_activations(distance * X, C, 1.0)
+    np.testing.assert_array_equal(np.argmax(b, axis=1), np.argmax(X @ C.T, axis=1))
+    np.testing.assert_allclose(b.sum(axis=1), 1.0)
+
+
+def test_near_and_far_say_the_same_where_they_meet():
+    direction = X[:1] / np.linalg.norm(X[0])
+    near, far = (normalized_activations(d * direction, 0.1 * C, 1.0) for d in (30.2, 30.5))
+    np.testing.assert_allclose(near, far, rtol=0.2)
+    exact = np.exp(30.5 * direction @ (0.1 * C).T - 0.5 * np.sum((0.1 * C) ** 2, axis=1))
+    np.testing.assert_allclose(far, exact / exact.sum(), rtol=1e-10)

@@ -5,6 +5,11 @@
 
 import numpy as np
 
+FAR = 460.0
+"""Where the nearest centre's exponent is below minus this, its activation is less than 1e-200."""
+NARROWEST, WIDEST = 1e-150, 1e150
+"""Widths whose square is a number in double precision."""
+
 
 def squared_distances(X: np.ndarray, centers: np.ndarray) -> np.ndarray:
     """Compute squared distances between states and centres.
@@ -65,18 +70,35 @@ def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float) -> 
         Shares of the centres, which sum to one.
     """
     exponent = squared_distances(X, centers)
-    # Far from all centres every activation would underflow to zero: the nearest one's exponent is taken out.
-    exponent -= exponent.min(axis=1, keepdims=True)
+    nearest = exponent.min(axis=1, keepdims=True)
+    far = nearest[:, 0] > 2 * FAR * width**2 if NARROWEST < width < WIDEST else np.zeros(len(X), dtype=bool)
+    with np.errstate(invalid="ignore"):  # where distances overflow
+        # Far from all centres every activation would underflow to zero: the nearest one's exponent is taken out.
+        exponent -= nearest
     exponent = _exponents(exponent, width)
+    if far.any():
+        exponent[far] = _exponents_from_afar(X[far], centers, width)
     np.exp(exponent, out=exponent)
     exponent /= exponent.sum(axis=1, keepdims=True)
     return exponent
 
 
+def _exponents_from_afar(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
+    """Compute `-‖x - c‖² / 2σ²` without the part that all centres share, and without squaring a state.
+
+    With m the centres' mean that is `(c - m)ᵀ(x - m) / σ² - ‖c - m‖² / 2σ²`, less the largest. Neither overflows, nor
+    drowns the centres' differences in the distance that they share.
+    """
+    mean = centers.mean(axis=0)
+    away = (centers - mean) / width
+    exponent = ((X - mean) / width) @ away.T - 0.5 * np.sum(away**2, axis=1)
+    return exponent - exponent.max(axis=1, keepdims=True)
+
+
 def _exponents(squares: np.ndarray, width: float) -> np.ndarray:
     """Divide squared distances by -2σ², in place; σ² itself may be more or less than double precision holds."""
     with np.errstate(over="ignore", under="ignore"):
-        if 1e-150 < width < 1e150:
+        if NARROWEST < width < WIDEST:
             squares *= -0.5 / width**2
         else:
             squares /= width

@@ -28,8 +28,6 @@ UNFINISHED = (
     "unconstrain.recordings.",
     "unconstrain.demonstrations.",
     "unconstrain.constraints.recorded.",
-    "unconstrain.storage.",
-    "unconstrain.deploy.",
 )
 
 

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.preprocessing import PolynomialFeatures, SplineTransformer
 
 import unconstrain as uc
 from unconstrain import storage
-from unconstrain.deploy import compilation
-from unconstrain.deploy.compiled import KINDS, Linear
+from unconstrain.deploy.compiled import Linear
+from unconstrain.deploy.compiled.loading import KINDS
 
 RNG = np.random.default_rng(0)
 X = RNG.uniform(-1.5, 1.5, size=(400, 3))
@@ -70,13 +71,15 @@ def test_agrees_on_the_training_states_the_ends_of_the_range_among_them(name):
 
 
 @each
-@pytest.mark.parametrize("distance", [1e2, 1e4, 1e8, 1e50])
+@pytest.mark.parametrize("distance", [1e2, 1e4, 1e8, 1e20, 1e50])
 def test_stays_finite_however_far_a_state_is(name, distance):
     far = distance * np.array([1.0, -0.5, 0.2])
     if "outside" in name or name == "steep potential":
         return  # splines told to go on as polynomials do so
     assert np.isfinite(STEPS[name](far)).all()
     assert np.isfinite(STEPS[name](far[None])).all()
+    assert_agrees(STEPS[name], far, POLICIES[name].predict(far[None])[0])
+    assert_agrees(STEPS[name], far[None], POLICIES[name].predict(far[None]))
 
 
 def test_where_every_activation_underflows_the_nearest_centre_decides():
@@ -207,17 +210,71 @@ def test_of_a_policy_that_learns_on_it_stays_as_it_was():
     np.testing.assert_array_equal(step(X), before)
 
 
+class Turning(BaseEstimator):
+    """Features of one's own, `π(x) = w (x_2, -x_1)`."""
+
+    def fit(self, X, d):
+        self.n_parameters_ = 1
+        return self
+
+    def along(self, X, directions):
+        return (directions[:, :1] * X[:, 1:2] - directions[:, 1:2] * X[:, :1]).reshape(-1, 1)
+
+    def evaluate(self, X, w):
+        return w * np.column_stack([X[:, 1], -X[:, 0]])
+
+    def compile(self, w):
+        return Linear(coef=float(w[0]) * np.array([[0.0, 1.0], [-1.0, 0.0]]), intercept=np.zeros(2))
+
+
+class Waves(TransformerMixin, BaseEstimator):
+    """A transformer of one's own, with what potentials and control loops ask for."""
+
+    def fit(self, X, y=None):
+        self.n_features_in_ = X.shape[1]
+        return self
+
+    def transform(self, X):
+        return np.sin(X)
+
+    def slopes(self, X, directions):
+        return np.cos(X) * directions
+
+    def gradient(self, X, w):
+        return np.cos(X) * w
+
+    def compile(self, W):
+        return Linear(coef=W, intercept=np.zeros(len(W)))
+
+    def compile_descent(self, w):
+        return Linear(coef=np.zeros((len(w), len(w))), intercept=-w)
+
+
+def test_features_of_ones_own_are_compiled_by_their_method():
+    policy = uc.ParametricPolicy(Turning()).fit(X[:, :2], X[:, 1::-1] * [0.5, -0.5])
+    np.testing.assert_allclose(policy.compile()(X[0, :2]), policy.predict(X[:1, :2])[0], atol=1e-12)
+    with pytest.raises(uc.errors.PolicyError, match="cannot be compiled"):
+        uc.ParametricPolicy(type("Mute", (Turning,), {"compile": None})()).fit(X[:, :2], X[:, :2]).compile()
+
+
+def test_transformers_of_ones_own_are_compiled_and_differentiated_by_their_methods():
+    smooth = uc.ParametricPolicy(uc.PotentialFeatures(Waves())).fit(X, -np.cos(X) * [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(smooth.predict(X), -np.cos(X) * [1.0, 2.0, 3.0], atol=1e-6)
+    for features in (Waves(), uc.PotentialFeatures(Waves())):  # which claim to be linear, and are found out
+        with pytest.raises(uc.errors.PolicyError, match="from predict"):
+            uc.ParametricPolicy(features).fit(X, U).compile()
+
+
 def test_scalar_actions_keep_their_dimension():
     step = uc.ParametricPolicy().fit(X, U[:, 0]).compile()
     assert step(X[0]).shape == (1,)
     assert step(X).shape == (400, 1)
 
 
-def test_compilation_notices_where_the_two_differ(monkeypatch):
+def test_compilation_notices_where_the_two_differ():
     wrong = Linear(coef=np.zeros((3, 3)), intercept=np.ones(3))
-    monkeypatch.setattr(compilation, "_compiled", lambda policy: wrong)
     with pytest.raises(uc.errors.PolicyError, match="from predict"):
-        POLICIES["linear"].compile()
+        wrong.check_agreement(POLICIES["linear"].predict)
 
 
 def written(tmp_path, tree, **changes):
@@ -286,17 +343,18 @@ def fitted(features):
             for out in (np.empty(2), np.empty(3, dtype=int))
         ],
         (lambda: STEPS["rbf"](X, np.empty((3, 3))), "out must be"),
-        (lambda: fitted(PolynomialFeatures(2)).compile(), "PolynomialFeatures features cannot"),
+        (lambda: fitted(PolynomialFeatures(2)).compile(), r"one with PolynomialFeatures\(\) cannot"),
         (
             lambda: fitted(uc.PotentialFeatures(PolynomialFeatures(2))).compile(),
-            "PolynomialFeatures features cannot",
+            r"one with PolynomialFeatures\(\) cannot",
         ),
         (
             lambda: fitted(SplineTransformer(extrapolation="periodic")).compile(),
-            "extrapolation='periodic' cannot",
+            r"extrapolation='periodic'\) cannot",
         ),
         (lambda: fitted(SplineTransformer(degree=1, extrapolation="linear")).compile(), "degree 2 or more"),
-        (lambda: Linear(coef=np.eye(2)), "holds coef, intercept"),
+        (lambda: Linear(coef=np.eye(2), intercept=np.zeros(3)), r"intercept .* must have shape \(2,\)"),
+        (lambda: Linear(coef=[[np.inf]], intercept=[0.0]), "coef .* must be finite"),
     ],
 )
 def test_mistakes_are_told_in_one_sentence(call, sentence):

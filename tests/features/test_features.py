@@ -203,7 +203,7 @@ X, U = np.random.default_rng(0).normal(size=(2, 20, 3))
             lambda: uc.ParametricPolicy(
                 uc.PotentialFeatures(SplineTransformer(extrapolation="periodic"))
             ).fit(X, U),
-            "splines of a potential need an extrapolation",
+            "gradient of its basis, .*got SplineTransformer",
         ),
         (lambda: uc.ParametricPolicy(uc.DecoupledFeatures).fit(X, U), "features must be"),
     ],

@@ -1,7 +1,7 @@
 """Policies as ONNX models, for controllers and languages that have an ONNX runtime and no Python.
 
-One input "x" (batch, n) and one output "u" (batch, d), both float64, with any number of states in a batch. The graph
-is built from a compiled policy's arrays:
+A model has one input "x" (batch, n) and one output "u" (batch, d), both float64, with any number of states in a batch.
+Each kind of compiled policy that can be written so has a method `draw`, which builds its graph:
 
 | kind   | graph                                    |
 | ------ | ---------------------------------------- |
@@ -9,31 +9,179 @@ is built from a compiled policy's arrays:
 | rbf    | Softmax(e) Wᵀ                            |
 | local  | Σ_m Softmax(e)_m (B_m x + t_m)           |
 
-with the exponents `e_i = (c_i - m)ᵀ(x - m) / σ² - ‖c_i - m‖² / 2σ²`, m the centres' mean: what is left of
+The exponents are `e_i = (c_i - m)ᵀ(x - m) / σ² - ‖c_i - m‖² / 2σ²`, m the centres' mean: what is left of
 `-‖x - c_i‖² / 2σ²` without the part that all centres share, which `Softmax` would take out anyway. That is one
 product, and nothing overflows far from all centres.
 """
 
 from importlib.metadata import version
-from pathlib import Path
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from unconstrain import atomic
-from unconstrain.deploy.compiled import CompiledPolicy, Linear, LocallyLinear, RadialBasis
+from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.errors import PolicyError
+
+if TYPE_CHECKING:
+    from onnx import ModelProto
 
 # Old enough for the runtimes on robots, new enough for everything the graphs need.
 OPSET = 17
 IR_VERSION = 8
 
 
-def save(step: CompiledPolicy, path: str | Path) -> None:
-    """Write the compiled policy to `path` as an ONNX model.
+@runtime_checkable
+class Drawable(Protocol):
+    """A compiled policy that can be written as an ONNX model."""
 
-    Raises `PolicyError` without the package onnx, and for kinds other than linear, rbf and local.
+    def draw(self, graph: "Graph") -> None:
+        """Build the graph that leads from "x" to "u".
+
+        Parameters
+        ----------
+        graph : Graph
+            An empty one.
+        """
+        ...
+
+
+class Graph:
+    """An ONNX graph that is being built. Everything in it has a name, and goes by it."""
+
+    def __init__(self) -> None:
+        self._nodes: list[Any] = []
+        self._constants: list[Any] = []
+
+    def constant(self, name: str, value: ArrayLike) -> str:
+        """Add an array.
+
+        Parameters
+        ----------
+        name : str
+        value : array
+
+        Returns
+        -------
+        str
+            The name.
+        """
+        from onnx import numpy_helper
+
+        self._constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
+        return name
+
+    def node(self, operator: str, *inputs: str, output: str, **attributes: Any) -> str:
+        """Add an operation.
+
+        Parameters
+        ----------
+        operator : str
+            One of ONNX's.
+        *inputs : str
+        output : str
+            The name of its result.
+        **attributes : int
+            Of the operator.
+
+        Returns
+        -------
+        str
+            The name of its result.
+        """
+        from onnx import helper
+
+        self._nodes.append(helper.make_node(operator, list(inputs), [output], name=output, **attributes))
+        return output
+
+    def affine(self, inputs: str, slopes: ArrayLike, offsets: ArrayLike, output: str) -> str:
+        """Add a linear function.
+
+        Parameters
+        ----------
+        inputs : str
+            Name of an array (batch, n).
+        slopes : array (k, n)
+        offsets : array (k,)
+        output : str
+            Name of the result (batch, k).
+
+        Returns
+        -------
+        str
+            The name of the result.
+        """
+        parts = self.constant(f"{output}_slopes", slopes), self.constant(f"{output}_offsets", offsets)
+        return self.node("Gemm", inputs, *parts, output=output, transB=1)
+
+    def blend(self, centers: np.ndarray, width: np.ndarray) -> str:
+        """Add the normalised activations of centres at "x".
+
+        Parameters
+        ----------
+        centers : array (M, n)
+        width : array ()
+
+        Returns
+        -------
+        str
+            The name of an array (batch, M).
+        """
+        mean = centers.mean(axis=0)
+        away = self.node("Sub", "x", self.constant("mean", mean), output="away")
+        scaled = (centers - mean) / width
+        exponents = self.affine(away, scaled / width, -0.5 * np.sum(scaled**2, axis=1), "exponents")
+        return self.node("Softmax", exponents, output="activations", axis=1)
+
+    def model(self, n: int, d: int) -> "ModelProto":
+        """Finish the graph.
+
+        Parameters
+        ----------
+        n, d : int
+            Dimensions of "x" and "u".
+
+        Returns
+        -------
+        ModelProto
+        """
+        from onnx import TensorProto, helper
+
+        graph = helper.make_graph(
+            self._nodes,
+            "policy",
+            [helper.make_tensor_value_info("x", TensorProto.DOUBLE, ["batch", n])],
+            [helper.make_tensor_value_info("u", TensorProto.DOUBLE, ["batch", d])],
+            self._constants,
+        )
+        return helper.make_model(
+            graph,
+            opset_imports=[helper.make_opsetid("", OPSET)],
+            ir_version=IR_VERSION,
+            producer_name="unconstrain",
+            producer_version=version("unconstrain"),
+        )
+
+
+def save(step: CompiledPolicy, path: str | PathLike[str]) -> None:
+    """Write a compiled policy as an ONNX model.
+
+    Parameters
+    ----------
+    step : CompiledPolicy
+    path : path
+        An existing file is replaced.
+
+    Raises
+    ------
+    PolicyError
+        The package onnx is not installed, or policies of this kind cannot be written so.
+    UnconstrainError
+        The place cannot be written to.
     """
-    if not isinstance(step, Linear | RadialBasis | LocallyLinear):
+    if not isinstance(step, Drawable):
         raise PolicyError(
             "linear, NormalizedRBF and locally linear policies can be written as ONNX, "
             f"this one is {step.kind}: use compile().save(path) instead"
@@ -44,62 +192,9 @@ def save(step: CompiledPolicy, path: str | Path) -> None:
         raise PolicyError(
             "writing ONNX needs the package onnx, which is not installed: pip install 'unconstrain[onnx]'"
         ) from None
-    model = _model(step)
+    graph = Graph()
+    step.draw(graph)
+    model = graph.model(step.n_states, step.n_actions)
     checker.check_model(model, full_check=True)
     with atomic.replacing(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
-
-
-def _model(step: CompiledPolicy):
-    from onnx import TensorProto, helper, numpy_helper
-
-    a, n, d = step.arrays, step.n_states, step.n_actions
-    nodes, constants = [], []
-
-    def constant(name: str, value) -> str:
-        constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
-        return name
-
-    def node(operator: str, *inputs: str, output: str, **attributes) -> str:
-        nodes.append(helper.make_node(operator, list(inputs), [output], name=output, **attributes))
-        return output
-
-    def affine(inputs: str, slopes, offsets, output: str) -> str:
-        return node(
-            "Gemm", inputs, constant(f"{output}_slopes", slopes), constant(f"{output}_offsets", offsets), output=output,
-            transB=1,
-        )  # fmt: skip
-
-    def blend() -> str:
-        mean = a["centers"].mean(axis=0)
-        centers = (a["centers"] - mean) / a["width"]
-        away = node("Sub", "x", constant("mean", mean), output="away")
-        exponents = affine(away, centers / a["width"], -0.5 * np.sum(centers**2, axis=1), "exponents")
-        return node("Softmax", exponents, output="activations", axis=1)
-
-    if isinstance(step, Linear):
-        affine("x", a["coef"], a["intercept"], "u")
-    elif isinstance(step, RadialBasis):
-        node("MatMul", blend(), constant("weights", a["weights"].T), output="u")
-    else:
-        M = len(a["centers"])
-        flat = affine("x", a["coef"].reshape(M * d, n), a["intercept"].reshape(-1), "flat")
-        local = node("Reshape", flat, constant("models", np.array([-1, M, d])), output="local")
-        row = constant("row", np.array([1]))
-        blended = node("MatMul", node("Unsqueeze", blend(), row, output="rows"), local, output="blended")
-        node("Squeeze", blended, row, output="u")
-
-    graph = helper.make_graph(
-        nodes,
-        "policy",
-        [helper.make_tensor_value_info("x", TensorProto.DOUBLE, ["batch", n])],
-        [helper.make_tensor_value_info("u", TensorProto.DOUBLE, ["batch", d])],
-        constants,
-    )
-    return helper.make_model(
-        graph,
-        opset_imports=[helper.make_opsetid("", OPSET)],
-        ir_version=IR_VERSION,
-        producer_name="unconstrain",
-        producer_version=version("unconstrain"),
-    )

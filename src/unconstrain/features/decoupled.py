@@ -20,10 +20,10 @@ from sklearn.base import BaseEstimator
 from sklearn.preprocessing import SplineTransformer
 
 from unconstrain.arrays import check_choice
+from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import check_square
-
-EXTRAPOLATIONS = ("linear", "constant", "continue")
+from unconstrain.features.splines import EXTRAPOLATIONS, Splines
 
 # A joint whose range is this much smaller than its value has not moved; its spline then spans a unit about it.
 NO_RANGE = 1e-9
@@ -151,6 +151,24 @@ class DecoupledFeatures(BaseEstimator):
             `π_j(x) = w_jᵀ b_j(x_j)`.
         """
         return np.einsum("njk,jk->nj", self._splines(X), w.reshape(self.n_actions_, -1))
+
+    def compile(self, w: np.ndarray) -> CompiledPolicy:
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : array (n k,)
+            Parameters.
+
+        Returns
+        -------
+        CompiledPolicy
+        """
+        n = self.n_actions_
+        own = w.reshape(n, -1) @ self.to_coefficients_.T
+        coefficients = np.zeros((*own.shape, n))
+        coefficients[np.arange(n), :, np.arange(n)] = own
+        return Splines(self.splines_).combined(coefficients)
 
     def _splines(self, X: np.ndarray) -> np.ndarray:
         """Compute the functions whose weights the parameters are, (N, n, k)."""

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator
 
+from unconstrain.deploy.compiled import CompiledPolicy, Linear
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import Features, fit_transformer, is_feature_map
+from unconstrain.features.bases import Compilable, adapted, compilation_error
 
 
 class FullFeatures(BaseEstimator):
@@ -124,6 +126,31 @@ class FullFeatures(BaseEstimator):
             `π(x) = W b(x)`.
         """
         return self.basis(X) @ w.reshape(self.n_actions_, -1).T
+
+    def compile(self, w: np.ndarray) -> CompiledPolicy:
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : array (dM,)
+            Parameters.
+
+        Returns
+        -------
+        CompiledPolicy
+
+        Raises
+        ------
+        PolicyError
+            It is not known how policies on this transformer are compiled.
+        """
+        W = w.reshape(self.n_actions_, -1)
+        if self.transformer_ is None:
+            return Linear(coef=W[:, :-1], intercept=W[:, -1])
+        basis = adapted(self.transformer_)
+        if not isinstance(basis, Compilable):
+            raise compilation_error(self.transformer_)
+        return basis.compile(W)
 
 
 def as_features(given: Any) -> Features:

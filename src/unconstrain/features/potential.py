@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator
 
+from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.features.base import check_square, fit_transformer
-from unconstrain.features.derivatives import check_differentiable, gradient, slopes
+from unconstrain.features.bases import CompilableDescent, adapted, compilation_error, differentiable
 from unconstrain.features.rbf import NormalizedRBF
 
 BLOCK_ROWS = 4096
@@ -74,7 +75,7 @@ class PotentialFeatures(BaseEstimator):
         """
         check_square("PotentialFeatures", X, d)
         transformer = NormalizedRBF(100) if self.transformer is None else self.transformer
-        check_differentiable(transformer)
+        differentiable(transformer)
         self.transformer_ = fit_transformer(transformer, X, sample_weight)
         return self
 
@@ -93,7 +94,7 @@ class PotentialFeatures(BaseEstimator):
         array (N, M)
             `v = -J_b(x) q`.
         """
-        V = slopes(self.transformer_, X, directions)
+        V = differentiable(self.transformer_).slopes(X, directions)
         return np.negative(V, out=V)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -111,11 +112,34 @@ class PotentialFeatures(BaseEstimator):
         array (N, n)
             `π(x) = -∇Φ(x)`.
         """
+        basis = differentiable(self.transformer_)
         actions = np.empty_like(X, dtype=np.float64)
         for start in range(0, len(X), BLOCK_ROWS):
             rows = slice(start, start + BLOCK_ROWS)
-            actions[rows] = -gradient(self.transformer_, X[rows], w)
+            actions[rows] = -basis.gradient(X[rows], w)
         return actions
+
+    def compile(self, w: np.ndarray) -> CompiledPolicy:
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : array (M,)
+            Parameters.
+
+        Returns
+        -------
+        CompiledPolicy
+
+        Raises
+        ------
+        PolicyError
+            It is not known how potentials of this transformer are compiled.
+        """
+        basis = adapted(self.transformer_)
+        if not isinstance(basis, CompilableDescent):
+            raise compilation_error(self.transformer_)
+        return basis.compile_descent(w)
 
     def potential(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the potential, up to a constant.

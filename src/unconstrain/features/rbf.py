@@ -13,6 +13,7 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_number, check_states, check_weights
+from unconstrain.deploy.compiled import Potential, RadialBasis
 from unconstrain.features.centers import place_centers
 from unconstrain.receptive import normalized_activations
 
@@ -117,6 +118,73 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         return normalized_activations(check_states(self, X), self.centers_, self.width_)
+
+    def slopes(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Compute the slopes of all basis functions, `b_i (qᵀc_i - Σ_j b_j qᵀc_j) / σ²`.
+
+        The state drops out, since `∇ log K_i = (c_i - x) / σ²`.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        directions : array (N, n)
+            q.
+
+        Returns
+        -------
+        array (N, M)
+            `qᵀ∇b_i(x)`.
+        """
+        B = normalized_activations(X, self.centers_, self.width_)
+        pulls = directions @ self.centers_.T
+        pulls -= np.einsum("nm,nm->n", B, pulls)[:, None]
+        B *= pulls
+        B /= self.width_**2
+        return B
+
+    def gradient(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Compute the gradient of `wᵀb(x)`.
+
+        Parameters
+        ----------
+        X : array (N, n)
+            States.
+        w : array (M,)
+
+        Returns
+        -------
+        array (N, n)
+        """
+        B = normalized_activations(X, self.centers_, self.width_)
+        heights = B @ w
+        return ((B * (w - heights[:, None])) @ self.centers_) / self.width_**2
+
+    def compile(self, W: np.ndarray) -> RadialBasis:
+        """Compile the policy `W b(x)`.
+
+        Parameters
+        ----------
+        W : array (d, M)
+
+        Returns
+        -------
+        RadialBasis
+        """
+        return RadialBasis(centers=self.centers_, width=self.width_, weights=W)
+
+    def compile_descent(self, w: np.ndarray) -> Potential:
+        """Compile the policy `-∇ wᵀb(x)`.
+
+        Parameters
+        ----------
+        w : array (M,)
+
+        Returns
+        -------
+        Potential
+        """
+        return Potential(centers=self.centers_, width=self.width_, weights=w)
 
     def get_feature_names_out(self, input_features: Any = None) -> np.ndarray:
         """Name the outputs rbf0, rbf1, ..., one for each centre.

@@ -451,9 +451,10 @@ class Policy(RegressorMixin, BaseEstimator):
         PolicyError
             The features cannot be compiled.
         """
-        from unconstrain.deploy.compilation import compile_policy
-
-        return compile_policy(self)
+        check_is_fitted(self)
+        step = self.model_.compile(self.solution_.w)
+        step.check_agreement(self.predict)
+        return step
 
     def to_onnx(self, path: str | PathLike[str]) -> None:
         """Write the policy as an ONNX model: input "x" (batch, n), output "u" (batch, d), float64.

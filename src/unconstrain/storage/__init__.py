@@ -10,12 +10,13 @@ as trusted.
 - `classes` lists the classes that files may hold.
 """
 
-from unconstrain.storage.archive import Kind, kind_of, read, write
+from unconstrain.storage.archive import Kind, damaged, kind_of, read, write
 from unconstrain.storage.encoding import decode, encode, foreign_parts
 from unconstrain.storage.objects import load_object, save_object
 
 __all__ = [
     "Kind",
+    "damaged",
     "decode",
     "encode",
     "foreign_parts",

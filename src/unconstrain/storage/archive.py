@@ -87,6 +87,7 @@ def damaged(path: FilePath, kind: Kind, reason: str) -> ArchiveError:
     Parameters
     ----------
     path : path
+        The file.
     kind : Kind
         What the file should hold.
     reason : str
@@ -107,6 +108,7 @@ def write(path: FilePath, kind: Kind, tree: Any, arrays: Mapping[str, "np.ndarra
     path : path
         An existing file is replaced.
     kind : Kind
+        What the file holds.
     tree : JSON value
         None, bool, int, float, str, and lists and dictionaries of them.
     arrays : mapping of str to array
@@ -158,6 +160,7 @@ def read(path: FilePath, kind: Kind) -> tuple[Any, dict[str, "np.ndarray"]]:
     Parameters
     ----------
     path : path
+        The file.
     kind : Kind
         What the file has to hold.
 
@@ -194,6 +197,7 @@ def kind_of(path: FilePath) -> Kind | None:
     Parameters
     ----------
     path : path
+        The file.
 
     Returns
     -------

@@ -83,20 +83,21 @@ def class_of(name: str) -> type | None:
     return found
 
 
-def name_of(cls: type) -> str | None:
+def name_of(kind: type) -> str | None:
     """Find the name under which files hold objects of a class.
 
     Parameters
     ----------
-    cls : type
+    kind : type
+        The class.
 
     Returns
     -------
     str or None
         None where the list does not have the class.
     """
-    name = f"{cls.__module__.partition('.')[0]}.{cls.__qualname__}"
-    return name if class_of(name) is cls else None
+    name = f"{kind.__module__.partition('.')[0]}.{kind.__qualname__}"
+    return name if class_of(name) is kind else None
 
 
 def without_circumstances(name: str, state: Any) -> Any:

@@ -21,6 +21,7 @@ def save_object(path: FilePath, kind: Kind, value: Any, check: Check | None = No
     path : path
         An existing file is replaced.
     kind : Kind
+        What the file holds.
     value : object
         Anything that `encode` takes.
     check : callable, optional
@@ -49,6 +50,7 @@ def load_object(
     Parameters
     ----------
     path : path
+        The file.
     kind : Kind
         What the file has to hold.
     expected : type

@@ -68,6 +68,7 @@ def save(path: str | os.PathLike[str], belongs_to: dict[str, str], progress: Pro
     Parameters
     ----------
     path : path
+        The file.
     belongs_to : dict
         As `identity` returned it.
     progress : Progress
@@ -88,6 +89,7 @@ def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy
     Parameters
     ----------
     path : path
+        The file.
     belongs_to : dict
         As `identity` returned it.
     given : Policy

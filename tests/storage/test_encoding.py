@@ -169,6 +169,8 @@ def test_the_list_holds_classes_that_are_found_again_by_their_name(name):
 
 
 HOSTILE = [
+    # A number of folds that a list is made of when learning goes on.
+    {"object": ["unconstrain.EpisodeFolds", {"n_folds": 10**12, "n_dealt": 0, "labels": [], "folds": {"array": "a"}}]},
     # What skops builds by calling or looking up, in our words and in its own.
     {"object": ["os.system", ["touch ran"]]},
     {"object": ["posix:system", ["touch ran"]]},
@@ -302,6 +304,7 @@ def inside(tree, *names):
         ("solution_.w", None),
         ("solution_.w", 3),
         ("predict", None),
+        ("score", 3),
         ("actions_are_scalars_", True),
         ("evaluate", "features_"),
     ],

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
 from unconstrain import atomic
-from unconstrain.errors import ArchiveError, UnconstrainError
+from unconstrain.errors import ArchiveError, DataError, UnconstrainError
+from unconstrain.memory import check_memory
 
 if TYPE_CHECKING:
     import numpy as np
@@ -174,6 +175,8 @@ def read(path: FilePath, kind: Kind) -> tuple[Any, dict[str, "np.ndarray"]]:
     ------
     ArchiveError
         The file is missing, foreign, damaged, of another kind, or was written by a newer release.
+    DataError
+        It does not fit into memory.
     """
     with _opened(path, kind) as file, _archive(file, path, kind) as archive:
         members = _members(archive, file)
@@ -183,6 +186,8 @@ def read(path: FilePath, kind: Kind) -> tuple[Any, dict[str, "np.ndarray"]]:
             raise ArchiveError(
                 f"{os.fspath(path)} holds {found.described}, not {kind.described}: {found.use}"
             )
+        size = sum(member.file_size for member in members.values())
+        check_memory(size, f"reading {os.fspath(path)}", "read it on a machine that has more")
         arrays = {
             name.removesuffix(".npy"): _array(archive, member)
             for name, member in members.items()
@@ -252,14 +257,8 @@ def _archive(file: IO[bytes], path: FilePath, kind: Kind | None) -> Iterator[zip
         _check_directory(file)
         with zipfile.ZipFile(file) as archive:
             yield archive
-    except ArchiveError:
+    except DataError:
         raise
-    except MemoryError:
-        size = os.fstat(file.fileno()).st_size
-        raise ArchiveError(
-            f"{os.fspath(path)} takes {size / 2**30:.1f} GB of memory, more than this machine has left: read it on "
-            "another"
-        ) from None
     # Bytes that only begin as ours can make the standard library's readers raise nearly anything.
     except Exception as error:
         reason = str(error) if isinstance(error, _Damage) else f"{type(error).__name__}: {error}"

@@ -57,6 +57,7 @@ _CIRCUMSTANCES = ("memory", "n_jobs")
 
 LARGEST_EXPANSION = 10**6
 """How many columns a transformer may make of one state, at most."""
+MOST_FOLDS = 1000
 
 
 def names() -> tuple[str, ...]:
@@ -137,19 +138,20 @@ def check_restored(made: Any) -> None:
         raise ValueError(f"the state of a {type(made).__name__} is not one it can have")
 
 
+_POLYNOMIALS = ("n_features_in_", "_min_degree", "_max_degree", "_n_out_full", "n_output_features_")
+
+
 def _plausible_polynomials(state: Mapping[str, Any]) -> bool:
-    fitted: list[Any] = [
-        state.get(name) for name in ("n_features_in_", "_min_degree", "_max_degree", "_n_out_full")
-    ]
+    fitted: list[Any] = [state.get(name) for name in _POLYNOMIALS]
     if all(each is None for each in fitted):
         return True
     if not all(type(each) is int for each in fitted):
         return False
-    n, least, degree, columns = fitted
+    n, least, degree, *columns = fitted
     # Where both are more than this, the number of columns is too large even to be computed.
     if min(n, degree) > 20 or not (0 < n <= LARGEST_EXPANSION and 0 <= least <= degree <= LARGEST_EXPANSION):
         return False
-    return columns <= math.comb(n + degree, degree) <= LARGEST_EXPANSION
+    return max(columns) <= math.comb(n + degree, degree) <= LARGEST_EXPANSION
 
 
 def _plausible_splines(state: Mapping[str, Any]) -> bool:
@@ -161,7 +163,17 @@ def _plausible_splines(state: Mapping[str, Any]) -> bool:
     return bool(state["n_features_in_"] == len(splines) and state["n_features_out_"] == columns)
 
 
+def _plausible_folds(state: Mapping[str, Any]) -> bool:
+    n_folds = state["n_folds"]
+    return (
+        type(n_folds) is int
+        and 0 < n_folds <= MOST_FOLDS
+        and set(state["fold_of"].values()) <= set(range(n_folds))
+    )
+
+
 _CHECKS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
+    "EpisodeFolds": _plausible_folds,
     "PolynomialFeatures": _plausible_polynomials,
     "SplineTransformer": _plausible_splines,
 }

@@ -412,6 +412,9 @@ class _Decoder:
             (restored,) = self.decoded(state)
         if listed is not None:
             restored = without_circumstances(name, restored)
+            shadowed = [key for key in state if callable(getattr(cls, key, None))]
+            if shadowed:
+                raise ValueError(f"it gives a {cls.__name__} another {shadowed[0]}")
         if hasattr(made, "__setstate__"):
             made.__setstate__(restored)
         elif restored is not None:

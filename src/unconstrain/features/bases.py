@@ -39,7 +39,7 @@ class Differentiable(Protocol):
         X : array (N, n)
             States.
         directions : array (N, n)
-            q.
+            Directions q, one for each state.
 
         Returns
         -------
@@ -56,10 +56,12 @@ class Differentiable(Protocol):
         X : array (N, n)
             States.
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         array (N, n)
+            The gradient at each state.
         """
         ...
 
@@ -74,10 +76,12 @@ class Compilable(Protocol):
         Parameters
         ----------
         W : array (d, M)
+            Weights of the basis functions, a row for each action.
 
         Returns
         -------
         CompiledPolicy
+            The same policy, as arrays.
 
         Raises
         ------
@@ -97,10 +101,12 @@ class CompilableDescent(Protocol):
         Parameters
         ----------
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         CompiledPolicy
+            The same policy, as arrays.
         """
         ...
 

@@ -163,6 +163,7 @@ class DecoupledFeatures(BaseEstimator):
         Returns
         -------
         CompiledPolicy
+            The same policy, as arrays.
         """
         n = self.n_actions_
         own = w.reshape(n, -1) @ self.to_coefficients_.T

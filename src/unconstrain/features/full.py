@@ -138,6 +138,7 @@ class FullFeatures(BaseEstimator):
         Returns
         -------
         CompiledPolicy
+            The same policy, as arrays.
 
         Raises
         ------

@@ -25,11 +25,12 @@ class Polynomials:
         X : array (N, n)
             States.
         directions : array (N, n)
-            q.
+            Directions q, one for each state.
 
         Returns
         -------
         array (N, M)
+            Slopes of the M basis functions.
         """
         powers = self.transformer.powers_
         table = _power_table(X, powers)
@@ -46,10 +47,12 @@ class Polynomials:
         X : array (N, n)
             States.
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         array (N, n)
+            The gradient at each state.
         """
         powers = self.transformer.powers_
         table = _power_table(X, powers)

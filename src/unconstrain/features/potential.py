@@ -130,6 +130,7 @@ class PotentialFeatures(BaseEstimator):
         Returns
         -------
         CompiledPolicy
+            The same policy, as arrays.
 
         Raises
         ------

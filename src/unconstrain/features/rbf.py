@@ -129,7 +129,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         X : array (N, n)
             States.
         directions : array (N, n)
-            q.
+            Directions q, one for each state.
 
         Returns
         -------
@@ -140,7 +140,8 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         pulls = directions @ self.centers_.T
         pulls -= np.einsum("nm,nm->n", B, pulls)[:, None]
         B *= pulls
-        B /= self.width_**2
+        B /= self.width_  # twice: σ² may be more or less than double precision holds
+        B /= self.width_
         return B
 
     def gradient(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -151,14 +152,16 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         X : array (N, n)
             States.
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         array (N, n)
+            The gradient at each state.
         """
         B = normalized_activations(X, self.centers_, self.width_)
         heights = B @ w
-        return ((B * (w - heights[:, None])) @ self.centers_) / self.width_**2
+        return ((B * (w - heights[:, None])) @ self.centers_) / self.width_ / self.width_
 
     def compile(self, W: np.ndarray) -> RadialBasis:
         """Compile the policy `W b(x)`.
@@ -166,10 +169,12 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         Parameters
         ----------
         W : array (d, M)
+            Weights of the basis functions, a row for each action.
 
         Returns
         -------
         RadialBasis
+            The same policy, as arrays.
         """
         return RadialBasis(centers=self.centers_, width=self.width_, weights=W)
 
@@ -179,10 +184,12 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         Parameters
         ----------
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         Potential
+            The same policy, as arrays.
         """
         return Potential(centers=self.centers_, width=self.width_, weights=w)
 

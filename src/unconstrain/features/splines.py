@@ -32,11 +32,12 @@ class Splines:
         X : array (N, n)
             States.
         directions : array (N, n)
-            q.
+            Directions q, one for each state.
 
         Returns
         -------
         array (N, M)
+            Slopes of the M basis functions.
         """
         return (self._derivatives(X) * directions[:, :, None]).reshape(len(X), -1)
 
@@ -48,10 +49,12 @@ class Splines:
         X : array (N, n)
             States.
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         array (N, n)
+            The gradient at each state.
         """
         return np.einsum("njk,jk->nj", self._derivatives(X), w.reshape(X.shape[1], -1))
 
@@ -61,10 +64,12 @@ class Splines:
         Parameters
         ----------
         W : array (d, M)
+            Weights of the basis functions, a row for each action.
 
         Returns
         -------
         Additive
+            The same policy, as arrays.
 
         Raises
         ------
@@ -85,10 +90,12 @@ class Splines:
         Parameters
         ----------
         w : array (M,)
+            Weights of the basis functions.
 
         Returns
         -------
         Additive
+            The same policy, as arrays.
         """
         n = len(self.transformer.bsplines_)
         breaks, origins, heights = self._pieces(w.reshape(n, -1, 1))
@@ -108,6 +115,7 @@ class Splines:
         Returns
         -------
         Additive
+            The same policy, as arrays.
         """
         breaks, origins, polynomials = self._pieces(coefficients)
         return Additive(breaks=breaks, origins=origins, polynomials=polynomials)

@@ -16,10 +16,7 @@ from unconstrain import metrics
 from unconstrain.arrays import (
     check_actions,
     check_choice,
-    check_groups,
     check_number,
-    check_projections,
-    check_samples,
     check_states,
     check_weights,
 )
@@ -31,14 +28,11 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import moving
-from unconstrain.policies.inputs import unpack_demonstrations
+from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
-from unconstrain.storage import Kind, save_object
 
 if TYPE_CHECKING:
     from unconstrain.deploy.compiled import CompiledPolicy
-
-LARGEST_DIMENSION = 10**6
 
 
 class Policy(RegressorMixin, BaseEstimator):
@@ -132,7 +126,7 @@ class Policy(RegressorMixin, BaseEstimator):
             An option is impossible.
         """
         fresh = copy(self)
-        samples, scalars = _check_input(fresh, X, y, groups, sample_weight, projections, first=True)
+        samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
         accumulator = fresh.start(samples)
         accumulator.add(samples)
         return self._adopt_from(fresh, accumulator, scalars)
@@ -179,7 +173,7 @@ class Policy(RegressorMixin, BaseEstimator):
             return self.fit(X, y, groups=groups, sample_weight=sample_weight, projections=projections)
         accumulator = self.resume()
         fresh = copy(self)
-        samples, _ = _check_input(fresh, X, y, groups, sample_weight, projections, first=False)
+        samples, _ = check_input(fresh, X, y, groups, sample_weight, projections, first=False)
         accumulator.longest = max(accumulator.longest, accumulator.total.longest)
         accumulator.add(samples)
         if accumulator.total.misjudged:
@@ -429,11 +423,13 @@ class Policy(RegressorMixin, BaseEstimator):
         UnconstrainError
             The place cannot be written to, or the policy holds something that cannot be saved, such as a lambda.
         """
+        from unconstrain.policies.saving import save_policy
+
         check_is_fitted(self)
         kept = copy(self)
         if not resumable and hasattr(kept, "accumulator_"):
             del kept.accumulator_
-        save_object(path, Kind.POLICY, kept, check_usable)
+        save_policy(kept, path)
 
     def compile(self) -> "CompiledPolicy":
         """Compile the fitted policy for a control loop.
@@ -571,57 +567,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return self
 
 
-def _check_input(
-    policy: Policy, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
-) -> tuple[Samples, bool]:
-    """Check the samples, and whether actions are of shape (N,); store the number of states where `first`."""
-    policy.check_options()
-    asked = projections
-    X, y, groups, projections = unpack_demonstrations(X, y, groups, projections)
-    if policy.risk == "direct":  # has no use for projections that come along with demonstrations
-        projections = asked
-    X, y = check_samples(policy, X, y, reset=first, min_samples=2 if first else 1)
-    U = check_actions(y)
-    if not first and U.shape[1] != policy.n_actions_:
-        raise DataError(
-            f"actions have {U.shape[1]} dimensions, but this policy has learnt {policy.n_actions_}"
-        )
-    if projections is not None:
-        if policy.risk == "direct":
-            raise PolicyError(
-                'projections= are for risk="inconsistency", and this policy has risk="direct", which looks at the '
-                "whole action"
-            )
-        projections = check_projections(projections, *U.shape, unknown=True)
-    weights = None if sample_weight is None else check_weights(sample_weight, X)
-    return Samples(X, U, check_groups(groups, len(X)), projections, weights), np.ndim(y) == 1
-
-
 def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:
     if value is None:
         raise AttributeError(f'{name} is there only after a fit with alpha="cv"')
     return value
-
-
-def check_usable(policy: Policy) -> None:
-    """Check that a policy is fitted and acts at the origin.
-
-    Parameters
-    ----------
-    policy : Policy
-        Any.
-
-    Raises
-    ------
-    ValueError
-        It does not act there, and something else where it cannot act at all.
-    """
-    check_is_fitted(policy)
-    n, d = policy.n_features_in_, policy.n_actions_
-    if not all(isinstance(each, int) and 0 < each <= LARGEST_DIMENSION for each in (n, d)):
-        raise TypeError("it has no dimensions")
-    actions = policy.predict(np.zeros((1, n)))
-    if actions.reshape(1, -1).shape != (1, d) or (actions.ndim == 1) != policy.actions_are_scalars_:
-        raise TypeError(f"its actions have shape {actions.shape}")
-    if not np.isfinite(actions).all():
-        raise ValueError("its actions are not finite")

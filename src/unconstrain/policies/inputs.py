@@ -1,9 +1,23 @@
 """What `fit` and its relatives accept in place of states and actions."""
 
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 from numpy.typing import ArrayLike
 
+from unconstrain.arrays import (
+    check_actions,
+    check_groups,
+    check_projections,
+    check_samples,
+    check_weights,
+)
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, PolicyError
+from unconstrain.samples import Samples
+
+if TYPE_CHECKING:
+    from unconstrain.policies.base import Policy
 
 
 def unpack_demonstrations(
@@ -50,3 +64,53 @@ def unpack_demonstrations(
     if groups is None and X.n_episodes > 1:
         groups = X.episodes
     return X.states, X.actions, groups, X.projections if projections is None else projections
+
+
+def check_input(
+    policy: "Policy", X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, *, first: bool
+) -> tuple[Samples, bool]:
+    """Check what `fit` was given.
+
+    Parameters
+    ----------
+    policy : Policy
+        Its number of states is stored where `first`.
+    X, y, groups, sample_weight, projections : as for `Policy.fit`
+        As the user gives them.
+    first : bool
+        Whether these are the first samples; further ones have to fit them.
+
+    Returns
+    -------
+    samples : Samples
+        Finite, in double precision, of dimensions that go together.
+    scalars : bool
+        Whether the actions are of shape (N,).
+
+    Raises
+    ------
+    DataError
+        Arrays are not finite or do not fit together.
+    PolicyError
+        Projections are given for the direct risk.
+    """
+    policy.check_options()
+    asked = projections
+    X, y, groups, projections = unpack_demonstrations(X, y, groups, projections)
+    if policy.risk == "direct":  # has no use for projections that come along with demonstrations
+        projections = asked
+    X, y = check_samples(policy, X, y, reset=first, min_samples=2 if first else 1)
+    U = check_actions(y)
+    if not first and U.shape[1] != policy.n_actions_:
+        raise DataError(
+            f"actions have {U.shape[1]} dimensions, but this policy has learnt {policy.n_actions_}"
+        )
+    if projections is not None:
+        if policy.risk == "direct":
+            raise PolicyError(
+                'projections= are for risk="inconsistency", and this policy has risk="direct", which looks at the '
+                "whole action"
+            )
+        projections = check_projections(projections, *U.shape, unknown=True)
+    weights = None if sample_weight is None else check_weights(sample_weight, X)
+    return Samples(X, U, check_groups(groups, len(X)), projections, weights), np.ndim(y) == 1

@@ -63,13 +63,13 @@ def compare_risks(
     ----------
     policy : Policy or None
         What to fit; it is cloned. With None, `select_policy` chooses among its own candidates first.
-    X : array (N, n)
+    X : array_like of shape (N, n)
         States.
-    U : array (N, d)
+    U : array_like of shape (N, d)
         Actions.
-    groups : array (N,), optional
+    groups : array_like of shape (N,), optional
         Episodes, which are held out whole; without them contiguous blocks are.
-    projections : array (N, d, d), optional
+    projections : array_like of shape (N, d, d), optional
         What is known of the constraints, NaN where nothing is.
     progress : callable, optional
         Called with the `Row` of each candidate once it is fitted.

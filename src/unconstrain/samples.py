@@ -11,15 +11,15 @@ class Samples(NamedTuple):
 
     Parameters
     ----------
-    states : array (N, n)
+    states : ndarray of shape (N, n)
         Where the samples are.
-    actions : array (N, d)
+    actions : ndarray of shape (N, d)
         What was done there.
-    groups : array (N,), optional
+    groups : ndarray of shape (N,), optional
         Episode labels.
-    projections : array (N, d, d), optional
+    projections : ndarray of shape (N, d, d), optional
         The nullspace projections, all NaN where one is not known.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Each multiplies the squared error of its sample.
     """
 

@@ -196,13 +196,13 @@ def select_policy(
     candidates : "auto", or list or dict of Policy
         Policies in a list are named after themselves, in a dict by their keys; "auto" stands for those that
         `candidates(n, d)` makes. They are cloned, never changed.
-    X : array (N, n), or Demonstrations
+    X : array_like of shape (N, n), or Demonstrations
         States. Demonstrations bring their actions, episodes and known projections.
-    U : array (N, d)
+    U : array_like of shape (N, d)
         Actions.
-    groups : array (N,), optional
+    groups : array_like of shape (N,), optional
         Episodes, which are held out whole; without them contiguous blocks are.
-    projections : array (N, d, d), optional
+    projections : array_like of shape (N, d, d), optional
         The nullspace projections, all NaN where one is not known. Candidates are then judged by the error under them,
         and those with the risk "inconsistency" learn from them.
     n_jobs : int, optional

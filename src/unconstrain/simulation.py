@@ -56,13 +56,13 @@ def rollout(
     ----------
     policy : object with ``predict(X)``, or callable ``X -> U``
         Maps states (S, n) to actions (S, n): a fitted policy of this library, or any function.
-    start : array (n,) or (S, n)
+    start : array_like of shape (n,) or (S, n)
         One start, or several that are followed side by side.
     steps : int
         Number of steps, at least 1.
     dt : float
         Duration of a step in seconds.
-    constraint : array (k, n), callable, or None
+    constraint : ndarray of shape (k, n), callable, or None
         Rows ``A`` with ``A u = 0``, the same at every state; or a function that is given the current states
         (S, n) and returns the rows at each, (S, k, n), or (k, n) where all share them. Without it the
         policy moves freely.
@@ -133,7 +133,7 @@ def simulate(
     ----------
     policy : object with ``predict(X)``, or callable ``X -> U``
         Maps states (S, n) to actions (S, d).
-    start : array (n,) or (S, n)
+    start : array_like of shape (n,) or (S, n)
         One start, or several that are followed side by side.
     steps : int
         Number of steps between samples, at least 0.

@@ -61,7 +61,7 @@ class Graph:
         Parameters
         ----------
         name : str
-        value : array
+        value : array_like
 
         Returns
         -------
@@ -103,8 +103,8 @@ class Graph:
         ----------
         inputs : str
             Name of an array (batch, n).
-        slopes : array (k, n)
-        offsets : array (k,)
+        slopes : array_like of shape (k, n)
+        offsets : array_like of shape (k,)
         output : str
             Name of the result (batch, k).
 
@@ -121,8 +121,8 @@ class Graph:
 
         Parameters
         ----------
-        centers : array (M, n)
-        width : array ()
+        centers : ndarray of shape (M, n)
+        width : ndarray of shape ()
 
         Returns
         -------

@@ -38,7 +38,7 @@ class Features(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
         d : int
             Dimension of the actions.
@@ -55,14 +55,14 @@ class Features(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, d)
+        directions : ndarray of shape (N, d)
             Of any length.
 
         Returns
         -------
-        array (N, P)
+        ndarray of shape (N, P)
             V, with `V w = qᵀπ(x)`.
         """
         ...
@@ -72,14 +72,14 @@ class Features(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (P,)
+        w : ndarray of shape (P,)
             Parameters.
 
         Returns
         -------
-        array (N, d)
+        ndarray of shape (N, d)
             `π(x) = Φ(x) w`.
         """
         ...
@@ -94,12 +94,12 @@ class FullBasis(Features, Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, of any precision.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             `b(x)`, in double precision.
         """
         ...
@@ -114,7 +114,7 @@ class Compilable(Protocol):
 
         Parameters
         ----------
-        w : array (P,)
+        w : ndarray of shape (P,)
             Parameters.
 
         Returns
@@ -153,11 +153,11 @@ def fit_features(features: Any, X: np.ndarray, d: int, sample_weight: np.ndarray
     ----------
     features : Features
         Left as it is.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     d : int
         Dimension of the actions.
-    sample_weight : array (N,), optional
+    sample_weight : ndarray of shape (N,), optional
         Passed on where `fit` takes it.
 
     Returns
@@ -178,9 +178,9 @@ def fit_transformer(transformer: Any, X: np.ndarray, sample_weight: np.ndarray |
     ----------
     transformer : transformer
         Left as it is.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
-    sample_weight : array (N,), optional
+    sample_weight : ndarray of shape (N,), optional
         Passed on where `fit` takes it.
 
     Returns
@@ -199,7 +199,7 @@ def check_square(name: str, X: np.ndarray, d: int) -> None:
     ----------
     name : str
         Of the features, for the sentence.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     d : int
         Dimension of the actions.

@@ -36,14 +36,14 @@ class Differentiable(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, n)
+        directions : ndarray of shape (N, n)
             Directions q, one for each state.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             The caller may change it.
         """
         ...
@@ -53,14 +53,14 @@ class Differentiable(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns
         -------
-        array (N, n)
+        ndarray of shape (N, n)
             The gradient at each state.
         """
         ...
@@ -75,7 +75,7 @@ class Compilable(Protocol):
 
         Parameters
         ----------
-        W : array (d, M)
+        W : ndarray of shape (d, M)
             Weights of the basis functions, a row for each action.
 
         Returns
@@ -100,7 +100,7 @@ class CompilableDescent(Protocol):
 
         Parameters
         ----------
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns

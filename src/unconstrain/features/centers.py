@@ -35,9 +35,9 @@ def place_centers(
 
     Parameters
     ----------
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
-    centers : {"grid", "kmeans", "coverage"} or array (M, n)
+    centers : {"grid", "kmeans", "coverage"} or array_like of shape (M, n)
         "grid" spans the range of the states, with as many centres along each dimension as `n_centers` allows. "kmeans"
         places `n_centers` cluster means. "coverage" gives every state an activation of at least `coverage` in some
         centre: with a width given, as many centres as that takes; without one, `n_centers` of them and the width that
@@ -48,14 +48,14 @@ def place_centers(
         Width σ; None takes it from the coverage, or for other placements from the spacing of the centres.
     coverage : float
         Between 0 and 1, for "coverage".
-    sample_weight : array (N,), optional
+    sample_weight : ndarray of shape (N,), optional
         Weight of each state, for "kmeans".
     random_state : int, optional
         Seed, for "kmeans".
 
     Returns
     -------
-    centers : array (M, n)
+    centers : ndarray of shape (M, n)
         The centres.
     width : float
         Their width σ.
@@ -88,14 +88,14 @@ def grid(X: np.ndarray, n_centers: int) -> np.ndarray:
 
     Parameters
     ----------
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     n_centers : int
         The most there may be.
 
     Returns
     -------
-    array (M, n)
+    ndarray of shape (M, n)
         Centres: k along each dimension in which the states differ, the largest k with `k^n <= n_centers`.
 
     Raises
@@ -128,18 +128,18 @@ def kmeans(
 
     Parameters
     ----------
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States; they are sorted first, so that their order does not matter.
     n_centers : int
         How many; fewer where fewer states differ.
-    sample_weight : array (N,), optional
+    sample_weight : ndarray of shape (N,), optional
         Weight of each state.
     random_state : int, optional
         Seed.
 
     Returns
     -------
-    array (M, n)
+    ndarray of shape (M, n)
         Cluster means.
     """
     from sklearn.cluster import KMeans  # slow to import
@@ -162,7 +162,7 @@ def farthest_first(
 
     Parameters
     ----------
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     n_centers : int, optional
         How many to choose at most.
@@ -171,7 +171,7 @@ def farthest_first(
 
     Returns
     -------
-    centers : array (M, n)
+    centers : ndarray of shape (M, n)
         The chosen states.
     radius : float
         The largest distance of a state from the nearest of them.

@@ -52,7 +52,7 @@ class DecoupledFeatures(BaseEstimator):
     ----------
     splines_ : SplineTransformer
         The splines of all dimensions.
-    to_coefficients_ : array (k, k)
+    to_coefficients_ : ndarray of shape (k, k)
         The coefficients of joint j's splines are `to_coefficients_ @ w_j`.
     n_actions_ : int
         d = n.
@@ -78,11 +78,11 @@ class DecoupledFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
         d : int
             Dimension of the actions.
-        sample_weight : array (N,), optional
+        sample_weight : ndarray of shape (N,), optional
             Weight of each sample, 1 by default.
 
         Returns
@@ -121,14 +121,14 @@ class DecoupledFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, n)
+        directions : ndarray of shape (N, n)
             One for each state, of any length.
 
         Returns
         -------
-        array (N, n k)
+        ndarray of shape (N, n k)
             `v = (q_1 b_1(x_1), ..., q_n b_n(x_n))`.
         """
         V = self._splines(X)
@@ -140,14 +140,14 @@ class DecoupledFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (n k,)
+        w : ndarray of shape (n k,)
             Parameters.
 
         Returns
         -------
-        array (N, n)
+        ndarray of shape (N, n)
             `π_j(x) = w_jᵀ b_j(x_j)`.
         """
         return np.einsum("njk,jk->nj", self._splines(X), w.reshape(self.n_actions_, -1))
@@ -157,7 +157,7 @@ class DecoupledFeatures(BaseEstimator):
 
         Parameters
         ----------
-        w : array (n k,)
+        w : ndarray of shape (n k,)
             Parameters.
 
         Returns

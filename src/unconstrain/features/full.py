@@ -54,11 +54,11 @@ class FullFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
         d : int
             Dimension of the actions.
-        sample_weight : array (N,), optional
+        sample_weight : ndarray of shape (N,), optional
             Passed on where the transformer takes it.
 
         Returns
@@ -77,12 +77,12 @@ class FullFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, of any precision.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             `b(x)`, in double precision.
         """
         if self.transformer_ is None:
@@ -98,14 +98,14 @@ class FullFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, d)
+        directions : ndarray of shape (N, d)
             One for each state, of any length.
 
         Returns
         -------
-        array (N, dM)
+        ndarray of shape (N, dM)
             `v = q ⊗ b(x)`.
         """
         return (directions[:, :, None] * self.basis(X)[:, None, :]).reshape(len(X), -1)
@@ -115,14 +115,14 @@ class FullFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (dM,)
+        w : ndarray of shape (dM,)
             Parameters.
 
         Returns
         -------
-        array (N, d)
+        ndarray of shape (N, d)
             `π(x) = W b(x)`.
         """
         return self.basis(X) @ w.reshape(self.n_actions_, -1).T
@@ -132,7 +132,7 @@ class FullFeatures(BaseEstimator):
 
         Parameters
         ----------
-        w : array (dM,)
+        w : ndarray of shape (dM,)
             Parameters.
 
         Returns

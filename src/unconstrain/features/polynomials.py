@@ -22,14 +22,14 @@ class Polynomials:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, n)
+        directions : ndarray of shape (N, n)
             Directions q, one for each state.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             Slopes of the M basis functions.
         """
         powers = self.transformer.powers_
@@ -44,14 +44,14 @@ class Polynomials:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns
         -------
-        array (N, n)
+        ndarray of shape (N, n)
             The gradient at each state.
         """
         powers = self.transformer.powers_

@@ -56,11 +56,11 @@ class PotentialFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
         d : int
             Dimension of the actions.
-        sample_weight : array (N,), optional
+        sample_weight : ndarray of shape (N,), optional
             Passed on where the transformer takes it.
 
         Returns
@@ -84,14 +84,14 @@ class PotentialFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, n)
+        directions : ndarray of shape (N, n)
             One for each state, of any length.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             `v = -J_b(x) q`.
         """
         V = differentiable(self.transformer_).slopes(X, directions)
@@ -102,14 +102,14 @@ class PotentialFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M,)
+        w : ndarray of shape (M,)
             Parameters.
 
         Returns
         -------
-        array (N, n)
+        ndarray of shape (N, n)
             `π(x) = -∇Φ(x)`.
         """
         basis = differentiable(self.transformer_)
@@ -124,7 +124,7 @@ class PotentialFeatures(BaseEstimator):
 
         Parameters
         ----------
-        w : array (M,)
+        w : ndarray of shape (M,)
             Parameters.
 
         Returns
@@ -147,14 +147,14 @@ class PotentialFeatures(BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M,)
+        w : ndarray of shape (M,)
             Parameters.
 
         Returns
         -------
-        array (N,)
+        ndarray of shape (N,)
             `Φ(x)`.
         """
         return self.transformer_.transform(X) @ w

@@ -28,7 +28,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
     width : float, optional
         Width σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit. None takes 1.5 times the centres' mean spacing (for
         "coverage": the width that covers).
-    centers : {"kmeans", "grid", "coverage"} or array (M, n)
+    centers : {"kmeans", "grid", "coverage"} or array_like of shape (M, n)
         "grid" spans the data's range.
     coverage : float
         For "coverage", the activation that every state has in at least one centre.
@@ -37,7 +37,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
     Attributes
     ----------
-    centers_ : array (M, n)
+    centers_ : ndarray of shape (M, n)
         The centres.
     width_ : float
         The width σ, in the states' unit.
@@ -70,11 +70,11 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : array_like of shape (N, n)
             States.
         y : None
             Ignored.
-        sample_weight : array (N,), optional
+        sample_weight : array_like of shape (N,), optional
             Weight of each sample, 1 by default.
 
         Returns
@@ -108,12 +108,12 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : array_like of shape (N, n)
             States.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             `b(x)`.
         """
         check_is_fitted(self)
@@ -126,14 +126,14 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, n)
+        directions : ndarray of shape (N, n)
             Directions q, one for each state.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             `qᵀ∇b_i(x)`.
         """
         B = normalized_activations(X, self.centers_, self.width_)
@@ -149,14 +149,14 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns
         -------
-        array (N, n)
+        ndarray of shape (N, n)
             The gradient at each state.
         """
         B = normalized_activations(X, self.centers_, self.width_)
@@ -168,7 +168,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        W : array (d, M)
+        W : ndarray of shape (d, M)
             Weights of the basis functions, a row for each action.
 
         Returns
@@ -183,7 +183,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Parameters
         ----------
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns
@@ -203,7 +203,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
 
         Returns
         -------
-        array (M,) of str
+        ndarray of shape (M,), str
             Names.
         """
         check_is_fitted(self)

@@ -29,14 +29,14 @@ class Splines:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, n)
+        directions : ndarray of shape (N, n)
             Directions q, one for each state.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             Slopes of the M basis functions.
         """
         return (self._derivatives(X) * directions[:, :, None]).reshape(len(X), -1)
@@ -46,14 +46,14 @@ class Splines:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns
         -------
-        array (N, n)
+        ndarray of shape (N, n)
             The gradient at each state.
         """
         return np.einsum("njk,jk->nj", self._derivatives(X), w.reshape(X.shape[1], -1))
@@ -63,7 +63,7 @@ class Splines:
 
         Parameters
         ----------
-        W : array (d, M)
+        W : ndarray of shape (d, M)
             Weights of the basis functions, a row for each action.
 
         Returns
@@ -89,7 +89,7 @@ class Splines:
 
         Parameters
         ----------
-        w : array (M,)
+        w : ndarray of shape (M,)
             Weights of the basis functions.
 
         Returns
@@ -109,7 +109,7 @@ class Splines:
 
         Parameters
         ----------
-        coefficients : array (n, k, d)
+        coefficients : ndarray of shape (n, k, d)
             Of the k splines in each dimension.
 
         Returns

@@ -34,11 +34,11 @@ class Solution:
 
     Parameters
     ----------
-    w : array (P,) or (S, P)
+    w : ndarray of shape (P,) or (S, P)
         Parameters of the model, or of each of S models.
     alpha : float
         The weight decay λ.
-    alphas, held_out_risk : array (L,), optional
+    alphas, held_out_risk : ndarray of shape (L,), optional
         The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
     n_samples, n_zero, n_known : int
         How many samples were added, how many of them do not move, and of how many the projection is known.
@@ -117,7 +117,7 @@ class Accumulator:
 
         Returns
         -------
-        array (N,) of int or None
+        ndarray of shape (N,), int or None
             The fold of each sample; None where λ is a number.
         """
         return None if self.folds is None else self.folds.assign(samples.groups, len(samples.states))
@@ -131,7 +131,7 @@ class Accumulator:
         ----------
         samples : Samples
             Checked.
-        fold : array (N,) of int, optional
+        fold : ndarray of shape (N,), int, optional
             From `deal`.
 
         Returns
@@ -326,12 +326,12 @@ def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> 
         Under the first, a sample that does not move says something only where its projection is known and not zero.
     samples : Samples
         N samples.
-    moves : array (N,) of bool
+    moves : ndarray of shape (N,), bool
         Which of them move.
 
     Returns
     -------
-    array (N,) of bool
+    ndarray of shape (N,), bool
         True for those that count.
     """
     if risk == "direct":

@@ -55,11 +55,11 @@ class Model(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
         observation : Observation
             Of N samples.
-        weights : array (N,), optional
+        weights : ndarray of shape (N,), optional
             Weight of each sample, 1 by default.
 
         Returns
@@ -74,12 +74,12 @@ class Model(Protocol):
 
         Parameters
         ----------
-        w : array (..., P / K, K)
+        w : ndarray of shape (..., P / K, K)
             A solution of the moments.
 
         Returns
         -------
-        array (P,) or (S, P)
+        ndarray of shape (P,) or (S, P)
             Parameters.
         """
         ...
@@ -89,14 +89,14 @@ class Model(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (P,) or (S, P)
+        w : ndarray of shape (P,) or (S, P)
             Parameters.
 
         Returns
         -------
-        array (N, d)
+        ndarray of shape (N, d)
             Actions.
         """
         ...
@@ -106,16 +106,16 @@ class Model(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        P : array (N, d)
+        P : ndarray of shape (N, d)
             Predictions.
         posterior : Posterior
             Of the parameters.
 
         Returns
         -------
-        array (N, d, d)
+        ndarray of shape (N, d, d)
             In squared units of the action.
         """
         ...
@@ -125,14 +125,14 @@ class Model(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, d)
+        directions : ndarray of shape (N, d)
             One for each state, of any length.
 
         Returns
         -------
-        array (N, P)
+        ndarray of shape (N, P)
             Features.
         """
         ...
@@ -142,12 +142,12 @@ class Model(Protocol):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
 
         Returns
         -------
-        array (N, S)
+        ndarray of shape (N, S)
             Weights, 0 to 1.
         """
         ...
@@ -157,7 +157,7 @@ class Model(Protocol):
 
         Parameters
         ----------
-        w : array (P,) or (S, P)
+        w : ndarray of shape (P,) or (S, P)
             Parameters.
 
         Returns
@@ -204,11 +204,11 @@ class GlobalModel:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, of any precision.
         observation : Observation
             Of N samples.
-        weights : array (N,), optional
+        weights : ndarray of shape (N,), optional
             Weight of each sample, 1 by default.
 
         Returns
@@ -223,12 +223,12 @@ class GlobalModel:
 
         Parameters
         ----------
-        w : array (P / K, K)
+        w : ndarray of shape (P / K, K)
             A solution of the moments.
 
         Returns
         -------
-        array (P,)
+        ndarray of shape (P,)
             Parameters.
         """
         return w.T.reshape(-1)
@@ -238,14 +238,14 @@ class GlobalModel:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (P,)
+        w : ndarray of shape (P,)
             Parameters.
 
         Returns
         -------
-        array (N, d)
+        ndarray of shape (N, d)
             Actions.
         """
         return self.features.evaluate(X, w)
@@ -255,16 +255,16 @@ class GlobalModel:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        P : array (N, d)
+        P : ndarray of shape (N, d)
             Predictions.
         posterior : Posterior
             Of the parameters.
 
         Returns
         -------
-        array (N, d, d)
+        ndarray of shape (N, d, d)
             In squared units of the action.
         """
         bias = self.features.evaluate(X, self.parameters(posterior.mean)) - P
@@ -279,14 +279,14 @@ class GlobalModel:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, d)
+        directions : ndarray of shape (N, d)
             One for each state, of any length.
 
         Returns
         -------
-        array (N, P)
+        ndarray of shape (N, P)
             Features.
         """
         return self.features.along(X, directions)
@@ -296,12 +296,12 @@ class GlobalModel:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
 
         Returns
         -------
-        array (N, 1)
+        ndarray of shape (N, 1)
             Ones.
         """
         return np.ones((len(X), 1))
@@ -311,7 +311,7 @@ class GlobalModel:
 
         Parameters
         ----------
-        w : array (P,)
+        w : ndarray of shape (P,)
             Parameters.
 
         Returns
@@ -355,7 +355,7 @@ class LocalModels:
     ----------
     features : Features
         Fitted; the same for every model.
-    centers : array (M, n)
+    centers : ndarray of shape (M, n)
         Centres of the receptive fields.
     width : float
         Width σ of the receptive fields, in the states' unit.
@@ -392,11 +392,11 @@ class LocalModels:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, of any precision.
         observation : Observation
             Of N samples.
-        weights : array (N,), optional
+        weights : ndarray of shape (N,), optional
             Weight of each sample, 1 by default.
 
         Returns
@@ -411,12 +411,12 @@ class LocalModels:
 
         Parameters
         ----------
-        w : array (M, P / K, K)
+        w : ndarray of shape (M, P / K, K)
             A solution of the moments.
 
         Returns
         -------
-        array (M, P)
+        ndarray of shape (M, P)
             Parameters.
         """
         return w.swapaxes(-1, -2).reshape(len(w), -1)
@@ -426,14 +426,14 @@ class LocalModels:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        w : array (M, P)
+        w : ndarray of shape (M, P)
             Parameters.
 
         Returns
         -------
-        array (N, d)
+        ndarray of shape (N, d)
             Actions.
         """
         actions = np.zeros((len(X), self.n_actions))
@@ -452,16 +452,16 @@ class LocalModels:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        P : array (N, d)
+        P : ndarray of shape (N, d)
             Predictions.
         posterior : Posterior
             Of the parameters.
 
         Returns
         -------
-        array (N, d, d)
+        ndarray of shape (N, d, d)
             In squared units of the action.
         """
         d, w = self.n_actions, self.parameters(posterior.mean)
@@ -481,14 +481,14 @@ class LocalModels:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
-        directions : array (N, d)
+        directions : ndarray of shape (N, d)
             One for each state, of any length.
 
         Returns
         -------
-        array (N, P)
+        ndarray of shape (N, P)
             Features.
         """
         return self.features.along(X, directions)
@@ -498,12 +498,12 @@ class LocalModels:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
 
         Returns
         -------
-        array (N, M)
+        ndarray of shape (N, M)
             Activations, 0 to 1.
         """
         return activations(X, self.centers, self.width)
@@ -513,7 +513,7 @@ class LocalModels:
 
         Parameters
         ----------
-        w : array (M, P)
+        w : ndarray of shape (M, P)
             Parameters.
 
         Returns
@@ -540,12 +540,12 @@ class LocalModels:
 
         Parameters
         ----------
-        w : array (M, P)
+        w : ndarray of shape (M, P)
             Parameters.
 
         Returns
         -------
-        tuple of array (M, d, n) and array (M, d), or None
+        tuple of ndarray of shape (M, d, n) and ndarray of shape (M, d), or None
             Slopes and offsets; None for features other than (x, 1).
         """
         if getattr(self.features, "transformer_", w) is not None:

@@ -35,13 +35,13 @@ class Moments:
 
     Parameters
     ----------
-    H : array (..., P, P)
+    H : ndarray of shape (..., P, P)
         Symmetric.
-    g : array (..., P, K)
+    g : ndarray of shape (..., P, K)
         K = 1, except for problems that share one H: the d dimensions of the action when nothing is projected.
-    squares : array (...,)
+    squares : ndarray of shape (...,)
         Sum s, in squared units of the action.
-    weight : array (...,)
+    weight : ndarray of shape (...,)
         `Σ ω_n`.
     n_samples : int
         How many samples were added.
@@ -135,12 +135,12 @@ class Moments:
 
         Parameters
         ----------
-        w : array (..., P, L, K)
+        w : ndarray of shape (..., P, L, K)
             L candidates.
 
         Returns
         -------
-        array (..., L)
+        ndarray of shape (..., L)
             Never below zero: what rounding leaves there is cut off.
         """
         *batch, P, L, K = w.shape
@@ -158,7 +158,7 @@ class Moments:
 
         Returns
         -------
-        array (..., P, K)
+        ndarray of shape (..., P, K)
             Parameters.
 
         Notes
@@ -201,11 +201,11 @@ class Spectrum:
 
     Parameters
     ----------
-    values : array (..., P)
+    values : ndarray of shape (..., P)
         Ascending.
-    vectors : array (..., P, P)
+    vectors : ndarray of shape (..., P, P)
         Q.
-    along : array (..., P, K)
+    along : ndarray of shape (..., P, K)
         `Qᵀg`.
     """
 
@@ -228,12 +228,12 @@ class Spectrum:
 
         Parameters
         ----------
-        alphas : array (L,)
+        alphas : array_like of shape (L,)
             One λ for each.
 
         Returns
         -------
-        array (..., P, L, K)
+        ndarray of shape (..., P, L, K)
             Parameters for each λ.
         """
         alphas = np.asarray(alphas, dtype=np.float64)

@@ -79,9 +79,9 @@ class Projected:
 
     Parameters
     ----------
-    rows : array (N, k, d)
+    rows : ndarray of shape (N, k, d)
         `Q`.
-    targets : array (N, k)
+    targets : ndarray of shape (N, k)
         `Q u`.
     whole : bool
         Whether every `Q` is the identity.
@@ -122,11 +122,11 @@ class AlongMotion:
 
     Parameters
     ----------
-    actions : array (N, d)
+    actions : ndarray of shape (N, d)
         Of any precision.
-    lengths : array (N,)
+    lengths : ndarray of shape (N,)
         `r`, zero where nothing moves.
-    inverse : array (N,)
+    inverse : ndarray of shape (N,)
         `1/r`, zero where nothing moves.
     """
 
@@ -181,12 +181,12 @@ def unknown(projections: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    projections : array (N, d, d)
+    projections : ndarray of shape (N, d, d)
         NaN where not known.
 
     Returns
     -------
-    array (N,) of bool
+    ndarray of shape (N,), bool
         True for those that are NaN.
     """
     return np.isnan(projections).any(axis=(1, 2))
@@ -197,12 +197,12 @@ def informative(projections: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    projections : array (N, d, d)
+    projections : ndarray of shape (N, d, d)
         NaN where not known.
 
     Returns
     -------
-    array (N,) of bool
+    ndarray of shape (N,), bool
         True for those that are known and not zero.
     """
     return ~unknown(projections) & projections.any(axis=(1, 2))
@@ -217,11 +217,11 @@ def observe(
     ----------
     risk : {"inconsistency", "direct"}
         Which risk.
-    U : array (N, d)
+    U : ndarray of shape (N, d)
         The actions.
-    projections : array (N, d, d), optional
+    projections : ndarray of shape (N, d, d), optional
         The nullspace projections, all NaN where one is not known. The direct risk does not use them.
-    r : array (N,), optional
+    r : ndarray of shape (N,), optional
         The lengths of the actions, zero where nothing moves, if they are computed already.
 
     Returns
@@ -254,12 +254,12 @@ def squared_errors(observation: Observation, P: np.ndarray) -> np.ndarray:
     ----------
     observation : Observation
         Of N samples.
-    P : array (N, d)
+    P : ndarray of shape (N, d)
         Predicted actions.
 
     Returns
     -------
-    array (N,)
+    ndarray of shape (N,)
         `‖Q (u - p)‖²`, in squared units of the action.
     """
     return np.sum((observation.targets - np.einsum("nkd,nd->nk", observation.rows, P)) ** 2, axis=1)

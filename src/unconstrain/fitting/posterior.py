@@ -36,15 +36,15 @@ class Posterior:
 
     Parameters
     ----------
-    mean : array (..., P, K)
+    mean : ndarray of shape (..., P, K)
         Means m.
-    covariance : array (..., P, P)
+    covariance : ndarray of shape (..., P, P)
         Σ, of each of the K targets that share H.
-    noise : array (...,)
+    noise : ndarray of shape (...,)
         Variance σ² of the noise, in squared units of the action.
-    decay : array (...,)
+    decay : ndarray of shape (...,)
         Weight decay λ.
-    log_evidence : array (...,)
+    log_evidence : ndarray of shape (...,)
         `log p(data | λ, σ²)`.
     """
 

@@ -54,14 +54,14 @@ class EpisodeFolds:
 
         Parameters
         ----------
-        groups : array (N,) or None
+        groups : ndarray of shape (N,) or None
             Episode labels.
         n_samples : int
             N.
 
         Returns
         -------
-        array (N,) of int
+        ndarray of shape (N,), int
             The fold of each sample.
         """
         if groups is None:
@@ -137,9 +137,9 @@ def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndar
     -------
     alpha : float
         The chosen λ.
-    alphas : array (L,)
+    alphas : ndarray of shape (L,)
         The candidates.
-    risk : array (L,)
+    risk : ndarray of shape (L,)
         Their held-out risk per unit of sample weight, in squared units of the action.
 
     Raises
@@ -168,12 +168,12 @@ def splits(n_samples: int, groups: np.ndarray | None = None) -> Iterator[tuple[n
     ----------
     n_samples : int
         N.
-    groups : array (N,), optional
+    groups : ndarray of shape (N,), optional
         Episode labels.
 
     Yields
     ------
-    train, test : array of int
+    train, test : ndarray of int
         One pair for each fold.
 
     Raises

@@ -65,11 +65,11 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, checked.
         d : int
             Dimension of the actions.
-        sample_weight : array (N,)
+        sample_weight : ndarray of shape (N,)
             Weight of each sample.
 
         Returns
@@ -101,16 +101,16 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n), or Demonstrations
+        X : array_like of shape (N, n), or Demonstrations
             States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, and the
             projections they know, unless these are given.
-        y : array (N, d) or (N,)
+        y : array_like of shape (N, d) or (N,)
             Actions.
-        groups : array (N,), optional
+        groups : array_like of shape (N,), optional
             Episode labels, the folds for `alpha="cv"`; without them contiguous blocks are the folds.
-        sample_weight : array (N,), optional
+        sample_weight : array_like of shape (N,), optional
             Multiplies each sample's squared error.
-        projections : array (N, d, d), optional
+        projections : array_like of shape (N, d, d), optional
             The nullspace projection of each sample, all NaN where it is not known.
 
         Returns
@@ -148,15 +148,15 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n), or Demonstrations
+        X : array_like of shape (N, n), or Demonstrations
             States.
-        y : array (N, d) or (N,)
+        y : array_like of shape (N, d) or (N,)
             Actions.
-        groups : array (N,), optional
+        groups : array_like of shape (N,), optional
             Episode labels.
-        sample_weight : array (N,), optional
+        sample_weight : array_like of shape (N,), optional
             Weight of each sample, 1 by default.
-        projections : array (N, d, d), optional
+        projections : array_like of shape (N, d, d), optional
             The nullspace projection of each sample, all NaN where it is not known.
 
         Returns
@@ -264,7 +264,7 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : array_like of shape (N, n)
             States.
         return_std : bool
             Return also how far the policy may be from that, as standard deviations of the actions' shape.
@@ -273,9 +273,9 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Returns
         -------
-        U : array (N, d)
+        U : ndarray of shape (N, d)
             Or (N,), where the policy was fitted to actions of that shape.
-        spread : array (N, d) or (N, d, d)
+        spread : ndarray of shape (N, d) or (N, d, d)
             Where asked for; see `fitting.posterior`.
 
         Raises
@@ -323,14 +323,14 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : array_like of shape (N, n)
             States.
         posterior : Posterior, optional
             By default that of the samples learnt from.
 
         Returns
         -------
-        array (N, d, d)
+        ndarray of shape (N, d, d)
             Second moments of the deviation, in squared units of the action.
         """
         check_is_fitted(self)
@@ -345,11 +345,11 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : array_like of shape (N, n)
             States.
-        y : array (N, d) or (N,)
+        y : array_like of shape (N, d) or (N,)
             Actions.
-        sample_weight : array (N,), optional
+        sample_weight : array_like of shape (N,), optional
             Weight of each sample, 1 by default.
 
         Returns
@@ -382,13 +382,13 @@ class Policy(RegressorMixin, BaseEstimator):
 
         Parameters
         ----------
-        start : array (n,) or (S, n)
+        start : array_like of shape (n,) or (S, n)
             One start, or several that are followed side by side.
         steps : int
             Number of steps.
         dt : float
             Duration of a step, in seconds.
-        constraint : array (k, n) or callable, optional
+        constraint : array_like of shape (k, n) or callable, optional
             Rows `A` with `A u = 0`, or a function that returns them for states (S, n).
         stop_when : callable, optional
             Is given the current states (S, n); where it says true for any of them the movement ends.

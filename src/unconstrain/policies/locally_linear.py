@@ -29,7 +29,7 @@ class LocallyLinearPolicy(Policy):
     width : float, optional
         Width σ, in the states' unit. None takes the width at which `n_centers` models reach the coverage, or, for other
         placements, 1.5 times the centres' mean spacing.
-    centers : {"coverage", "kmeans", "grid"} or array (M, n)
+    centers : {"coverage", "kmeans", "grid"} or array_like of shape (M, n)
         Where the models lie.
     coverage : float
         Every sample has a weight of at least this in some model; with a width given it sets their number.
@@ -44,15 +44,15 @@ class LocallyLinearPolicy(Policy):
 
     Attributes
     ----------
-    centers_ : array (M, n)
+    centers_ : ndarray of shape (M, n)
         The centres of the receptive fields.
     width_ : float
         Their width σ, in the states' unit.
-    weights_ : array (M, P)
+    weights_ : ndarray of shape (M, P)
         The parameters of each model.
-    coef_ : array (M, d, n)
+    coef_ : ndarray of shape (M, d, n)
         Slopes of linear models; not there for other features.
-    intercept_ : array (M, d)
+    intercept_ : ndarray of shape (M, d)
         Offsets of linear models.
     alpha_, alphas_, held_out_risk_, n_samples_seen_, n_zero_actions_, n_known_constraints_
         As for `ParametricPolicy`.
@@ -84,11 +84,11 @@ class LocallyLinearPolicy(Policy):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, checked.
         d : int
             Dimension of the actions.
-        sample_weight : array (N,)
+        sample_weight : ndarray of shape (N,)
             Weight of each sample.
 
         Returns

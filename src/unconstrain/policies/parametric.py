@@ -32,13 +32,13 @@ class ParametricPolicy(Policy):
 
     Attributes
     ----------
-    weights_ : array (P,)
+    weights_ : ndarray of shape (P,)
         The parameters w.
     features_ : Features
         The fitted feature map.
     alpha_ : float
         The λ used.
-    alphas_, held_out_risk_ : array (25,)
+    alphas_, held_out_risk_ : ndarray of shape (25,)
         The candidates and their held-out risk, with `alpha="cv"`.
     n_samples_seen_, n_zero_actions_, n_known_constraints_ : int
         How many samples were learnt from, how many of them have no direction, and of how many the projection was known.
@@ -65,11 +65,11 @@ class ParametricPolicy(Policy):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States, checked.
         d : int
             Dimension of the actions.
-        sample_weight : array (N,)
+        sample_weight : ndarray of shape (N,)
             Weight of each sample.
 
         Returns

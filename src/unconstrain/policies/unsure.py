@@ -38,14 +38,14 @@ class Unsure:
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
 
         Returns
         -------
-        deviation : array (N,)
+        deviation : ndarray of shape (N,)
             The root of the summed variances of all actions, in units of the action.
-        speed : array (N,)
+        speed : ndarray of shape (N,)
             Length of the predicted action.
         """
         P = np.reshape(self.policy.predict(X), (len(X), -1))

@@ -41,7 +41,7 @@ class Robot:
         What the model was compiled from, joints locked: copy it to add tables and balls.
     joints : tuple of str
         Names of the n joints that move, in the order of the columns of Q.
-    limits : array (n, 2)
+    limits : ndarray of shape (n, 2)
         Lower and upper limits, in radians or metres; infinite where the file gives none.
     notes : tuple of str
 
@@ -145,16 +145,16 @@ class Robot:
 
         Parameters
         ----------
-        Q : array (N, n)
+        Q : array_like of shape (N, n)
             Joint positions, in radians or metres.
         frame : str
             One of `frames`.
 
         Returns
         -------
-        positions : array (N, 3)
+        positions : ndarray of shape (N, 3)
             Of the frame's origin, in metres.
-        rotations : array (N, 3, 3)
+        rotations : ndarray of shape (N, 3, 3)
             Their columns are the frame's axes.
 
         Raises
@@ -176,14 +176,14 @@ class Robot:
 
         Parameters
         ----------
-        Q : array (N, n)
+        Q : array_like of shape (N, n)
             Joint positions, in radians or metres.
         frame : str
             One of `frames`.
 
         Returns
         -------
-        array (N, 6, n)
+        ndarray of shape (N, 6, n)
             Rows 1 to 3 give the velocity v of the frame's origin (m/s), rows 4 to 6 the angular velocity ω
             (rad/s), both in the world.
 

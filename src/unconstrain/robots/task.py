@@ -26,7 +26,7 @@ class TaskConstraint:
 
     Parameters
     ----------
-    selection : array (k, 6)
+    selection : ndarray of shape (k, 6)
         S, over the three velocities and the three angular velocities in the world.
     name : str
         The constraint as the user wrote it.
@@ -50,7 +50,7 @@ class TaskConstraint:
 
         Parameters
         ----------
-        given : str, array, or TaskConstraint
+        given : str, array_like, or TaskConstraint
             Task rows, ``"1-2-3"``; the normal of a plane on which the hand slides, ``"0,0,1"`` or an array
             (3,), of any length but zero; or a matrix S, an array (k, 6) or its rows as text,
             ``"1,0,0,0,0,0; 0,0,1,0,0,0"``.
@@ -104,12 +104,12 @@ class TaskConstraint:
 
         Parameters
         ----------
-        jacobians : array (N, 6, n)
+        jacobians : ndarray of shape (N, 6, n)
             Of the hand, as `Robot.jacobian` gives them.
 
         Returns
         -------
-        array (N, k, n)
+        ndarray of shape (N, k, n)
             A, one matrix for each Jacobian.
         """
         return self.selection @ jacobians
@@ -119,12 +119,12 @@ class TaskConstraint:
 
         Parameters
         ----------
-        jacobians : array (N, 6, n)
+        jacobians : ndarray of shape (N, 6, n)
             Of the hand, as `Robot.jacobian` gives them.
 
         Returns
         -------
-        array (N, n, n)
+        ndarray of shape (N, n, n)
             N, one matrix for each Jacobian.
         """
         return projection(self.rows(jacobians))

@@ -112,7 +112,7 @@ def write(path: FilePath, kind: Kind, tree: Any, arrays: Mapping[str, "np.ndarra
         What the file holds.
     tree : JSON value
         None, bool, int, float, str, and lists and dictionaries of them.
-    arrays : mapping of str to array
+    arrays : mapping of str to ndarray
         Numbers, booleans and text. Names consist of letters, digits, ``_``, ``-`` and ``.``.
 
     Raises
@@ -168,7 +168,7 @@ def read(path: FilePath, kind: Kind) -> tuple[Any, dict[str, "np.ndarray"]]:
     Returns
     -------
     tree : JSON value
-    arrays : dict of str to array
+    arrays : dict of str to ndarray
         Writable, in the machine's byte order.
 
     Raises

@@ -67,7 +67,7 @@ def encode(value: Any) -> tuple[Any, dict[str, np.ndarray]]:
     Returns
     -------
     tree : JSON value
-    arrays : dict of str to array
+    arrays : dict of str to ndarray
         By the names that the tree calls them by.
 
     Raises
@@ -107,7 +107,7 @@ def decode(tree: Any, arrays: dict[str, np.ndarray], trusted: Iterable[Any] = ()
     Parameters
     ----------
     tree : JSON value
-    arrays : dict of str to array
+    arrays : dict of str to ndarray
         As `encode` returned them. Arrays are not copied.
     trusted : classes and functions, optional
         What the object may hold besides the listed classes.

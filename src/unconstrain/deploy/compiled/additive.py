@@ -18,11 +18,11 @@ class Additive(CompiledPolicy):
 
     Parameters
     ----------
-    breaks : array (n, K)
+    breaks : array_like of shape (n, K)
         In order.
-    origins : array (n, K + 1)
+    origins : array_like of shape (n, K + 1)
         Of each piece.
-    polynomials : array (n, K + 1, degree + 1, d)
+    polynomials : array_like of shape (n, K + 1, degree + 1, d)
         Their coefficients, from the constant on.
     """
 

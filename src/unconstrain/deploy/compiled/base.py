@@ -27,7 +27,7 @@ class CompiledPolicy(ABC):
 
     Parameters
     ----------
-    **arrays : array
+    **arrays : ndarray
         Those of the kind, finite.
 
     Attributes
@@ -38,7 +38,7 @@ class CompiledPolicy(ABC):
         The names of the kind's arrays, and how many dimensions each has.
     n_states, n_actions : int
         n and d.
-    arrays : dict of str to array
+    arrays : dict of str to ndarray
         Read-only.
 
     Raises
@@ -92,14 +92,14 @@ class CompiledPolicy(ABC):
 
         Parameters
         ----------
-        x : array (n,) or (N, n)
+        x : array_like of shape (n,) or (N, n)
             One state, or a batch.
-        out : array (d,) or (N, d), optional
+        out : ndarray of shape (d,) or (N, d), optional
             Where to write the actions: contiguous and float64. For one state nothing is allocated then.
 
         Returns
         -------
-        array (d,) or (N, d)
+        ndarray of shape (d,) or (N, d)
             Finite for any finite state within 1e150 of the centres.
 
         Raises
@@ -153,7 +153,7 @@ class CompiledPolicy(ABC):
 
         Parameters
         ----------
-        X : array (N, n)
+        X : ndarray of shape (N, n)
             States.
 
         Returns
@@ -210,7 +210,7 @@ def check_shapes(arrays: dict[str, ndarray], **shapes: tuple[int, ...]) -> None:
 
     Parameters
     ----------
-    arrays : dict of str to array
+    arrays : dict of str to ndarray
     **shapes : tuple of int
         By the arrays' names.
 

@@ -86,11 +86,11 @@ class RadialBasis(Centered):
 
     Parameters
     ----------
-    centers : array (M, n)
+    centers : array_like of shape (M, n)
         c_i.
     width : float
         σ, in the states' unit.
-    weights : array (d, M)
+    weights : array_like of shape (d, M)
         W.
     """
 
@@ -147,13 +147,13 @@ class LocallyLinear(Centered):
 
     Parameters
     ----------
-    centers : array (M, n)
+    centers : array_like of shape (M, n)
         c_i.
     width : float
         σ, in the states' unit.
-    coef : array (M, d, n)
+    coef : array_like of shape (M, d, n)
         B_m.
-    intercept : array (M, d)
+    intercept : array_like of shape (M, d)
         t_m.
     """
 
@@ -224,11 +224,11 @@ class Potential(Centered):
 
     Parameters
     ----------
-    centers : array (M, n)
+    centers : array_like of shape (M, n)
         c_i.
     width : float
         σ, in the states' unit.
-    weights : array (M,)
+    weights : array_like of shape (M,)
         w.
     """
 

@@ -17,9 +17,9 @@ class Linear(CompiledPolicy):
 
     Parameters
     ----------
-    coef : array (d, n)
+    coef : array_like of shape (d, n)
         W.
-    intercept : array (d,)
+    intercept : array_like of shape (d,)
         t.
     """
 

@@ -41,7 +41,7 @@ def sum_over_blocks(
 
     Returns
     -------
-    list of array
+    list of ndarray
         The totals.
 
     Raises
@@ -96,7 +96,7 @@ def working_space(name: str, *shape: int) -> np.ndarray:
 
     Returns
     -------
-    array
+    ndarray
         Of that shape.
     """
     held: np.ndarray | None = getattr(_spaces, name, None)

@@ -42,15 +42,15 @@ def moments(
     ----------
     features : Features
         Fitted; the same for every model.
-    centers : array (M, n)
+    centers : ndarray of shape (M, n)
         The models' centres.
     width : float
         Width σ, in the states' unit.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     observation : Observation
         Of N samples.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
 
     Returns

@@ -37,11 +37,11 @@ def moments(
     ----------
     features : Features
         Fitted.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     observation : Observation
         Of N samples.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
 
     Returns
@@ -70,11 +70,11 @@ def of_products(
     ----------
     features : FullBasis
         Fitted.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     observation : Observation
         Of N samples.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
 
     Returns
@@ -110,11 +110,11 @@ def of_whole_actions(
     ----------
     features : FullBasis
         Fitted.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     observation : Observation
         Of N samples.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
 
     Returns
@@ -145,11 +145,11 @@ def of_rows(
     ----------
     features : Features
         Fitted.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     observation : Observation
         Of N samples.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
 
     Returns

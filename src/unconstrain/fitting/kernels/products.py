@@ -35,9 +35,9 @@ def pairs(k: int) -> tuple[np.ndarray, np.ndarray]:
 
     Returns
     -------
-    i : array (k(k+1)/2,) of int
+    i : ndarray of shape (k(k+1)/2,), int
         The first columns.
-    j : array (k(k+1)/2,) of int
+    j : ndarray of shape (k(k+1)/2,), int
         The second columns.
     """
     distance, i = np.divmod(np.arange(n_pairs(k)), k)
@@ -54,7 +54,7 @@ def pair_index(k: int) -> np.ndarray:
 
     Returns
     -------
-    array (k, k) of int
+    ndarray of shape (k, k), int
         Indices into `distinct_products`.
     """
     index = np.empty((k, k), dtype=np.intp)
@@ -70,16 +70,16 @@ def distinct_products(
 
     Parameters
     ----------
-    A : array (N, k)
+    A : ndarray of shape (N, k)
         Columns.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weights ω, 1 by default.
-    out : array (k(k+1)/2, N), optional
+    out : ndarray of shape (k(k+1)/2, N), optional
         Where they may be written.
 
     Returns
     -------
-    array (k(k+1)/2, N)
+    ndarray of shape (k(k+1)/2, N)
         In the order of `pairs`.
     """
     N, k = A.shape
@@ -105,16 +105,16 @@ def observed_products(
 
     Parameters
     ----------
-    rows : array (N, k, d)
+    rows : ndarray of shape (N, k, d)
         Q.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weights ω, 1 by default.
-    out : array (d(d+1)/2, N), optional
+    out : ndarray of shape (d(d+1)/2, N), optional
         Where they may be written.
 
     Returns
     -------
-    array (d(d+1)/2, N)
+    ndarray of shape (d(d+1)/2, N)
         In the order of `pairs`.
     """
     if rows.shape[1] == 1:
@@ -129,14 +129,14 @@ def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    rows : array (N, k, d)
+    rows : ndarray of shape (N, k, d)
         Q.
-    targets : array (N, k)
+    targets : ndarray of shape (N, k)
         `Q u`.
 
     Returns
     -------
-    array (N, d)
+    ndarray of shape (N, d)
         One for each sample.
     """
     if rows.shape[1] == 1:
@@ -149,14 +149,14 @@ def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
 
     Parameters
     ----------
-    products : array (..., M(M+1)/2, d(d+1)/2)
+    products : ndarray of shape (..., M(M+1)/2, d(d+1)/2)
         Products of features, times products of directions.
     M, d : int
         Numbers of features and of actions.
 
     Returns
     -------
-    array (..., dM, dM)
+    ndarray of shape (..., dM, dM)
         H.
     """
     over_q = products[..., pair_index(d)]  # (..., pairs of b, d, d)

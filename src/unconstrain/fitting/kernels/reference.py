@@ -16,11 +16,11 @@ def moments(
     ----------
     features : Features
         Fitted.
-    X : array (N, n)
+    X : ndarray of shape (N, n)
         States.
     observation : Observation
         Of N samples.
-    weights : array (N,), optional
+    weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
 
     Returns

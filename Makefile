@@ -19,9 +19,11 @@ test: $(VENV)/.test
 bench: $(VENV)/.test
 	env -u OPENBLAS_CORETYPE -u OPENBLAS_L2_SIZE $(BIN)/python -m benchmarks
 
-# Every experiment of the paper; hours. Finished trials are kept, and the same command goes on from them.
+# Every experiment of the paper takes hours; EXPERIMENT=toy runs one, OPTIONS="--trials 2" less of it. Finished trials are
+# kept, and the same command goes on from them.
+EXPERIMENT ?= all
 reproduce: $(VENV)/.test
-	$(BIN)/python -m reproduction all
+	$(BIN)/python -m reproduction $(EXPERIMENT) $(OPTIONS)
 
 format: $(VENV)/.test
 	$(BIN)/ruff check --fix .

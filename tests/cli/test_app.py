@@ -194,3 +194,14 @@ def test_ctrl_c_while_importing_is_one_line(tmp_path):
 def test_arguments_are_named_as_options(sentence, told):
     names = ("action", "alpha", "time_unit", "resumable")
     assert in_words_of_options(sentence, {name: f"--{name.replace('_', '-')}" for name in names}) == told
+
+
+@pytest.mark.parametrize("closed", [1, 2])
+def test_closed_streams_lose_nothing(movements, tmp_path, closed):
+    arguments = ["fit", movements, *COLUMNS, "--model", "linear", "--out", tmp_path / "p.skops"]
+    shell = f'exec "$@" {closed}>&-'
+    command = ["sh", "-c", shell, "sh", sys.executable, "-m", "unconstrain", *map(str, arguments)]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert "Traceback" not in ended.stderr + ended.stdout
+    assert uc.load_policy(tmp_path / "p.skops").n_features_in_ == 2

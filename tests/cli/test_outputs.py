@@ -42,6 +42,8 @@ def test_what_exists_is_replaced_only_if_told_to(files):
         check_outputs(["d.csv"], {"out": out}, overwrite=False)
     check_outputs(["d.csv"], {"out": out}, overwrite=True)
     check_outputs(["d.csv"], {"out": files / "new.skops"}, overwrite=False, continued={"checkpoint": out})
+    (files / "parts" / "p.skops").write_text("kept")
+    check_outputs(["parts"], {"out": files / "parts" / "p.skops"}, overwrite=True)
     assert out.read_text() == "kept"
     assert not (files / "new.skops").exists()
 

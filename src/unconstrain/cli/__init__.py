@@ -12,9 +12,8 @@ def main() -> None:
     except KeyboardInterrupt as stop:
         said = f"{stop}; " if str(stop) else "interrupted: "
         print(f"{said}nothing was left half written", file=sys.stderr)
-        exec(
-            ""
-        )  # Python kills itself at its end if an interrupt passed through `exec`, unless one ends well later
+        # If an interrupt passes through `exec`, Python kills itself at its end, unless a later one ends well.
+        exec("")
         code = 130
     sys.exit(code)
 

@@ -62,12 +62,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
     with reporting.warnings_as_sentences(), reporting.forgiving_output() as output:
         code = _run(arguments)
         output.flush()
-    if output.failure is None:
-        return code
-    reporting.say_error(
-        f"standard output could not be written ({output.failure}), so not all was said; all files were written"
-    )
-    return code or 1
+        if output.failure is not None:
+            reporting.say_error(
+                f"standard output could not be written ({output.failure}), so not all was said; files were written as "
+                "they would be otherwise"
+            )
+            code = code or 1
+    return code
 
 
 def _run(arguments: Sequence[str] | None) -> int:

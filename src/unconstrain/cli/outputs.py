@@ -14,6 +14,9 @@ from unconstrain.plot.saving import SUFFIXES, check_suffix
 
 SECTION = "Output"
 
+NEVER_READ = (".skops", *SUFFIXES)
+"""How the names of outputs end that no reader of folders takes for recordings."""
+
 overwrite = option(
     "--overwrite",
     is_flag=True,
@@ -77,7 +80,8 @@ def check_outputs(
         real = _real(path)
         if any(_is_same(real, other) for other in read):
             raise DataError(f"{path} is one of the files that are read: choose another name for {name}=")
-        if os.path.exists(real) and any(real.startswith(os.path.join(folder, "")) for folder in read):
+        inside = any(real.startswith(os.path.join(folder, "")) for folder in read)
+        if inside and os.path.exists(real) and path.suffix.lower() not in NEVER_READ:
             raise DataError(f"{path} is in a folder that is read: choose another name for {name}=")
         if real in named:
             raise DataError(f"{named[real]}= and {name}= are the same file, {path}: choose two names")

@@ -13,16 +13,14 @@ from typing import TextIO
 
 @contextmanager
 def forgiving_output() -> Iterator["ForgivingOutput"]:
-    """Let standard output fail without stopping the work or losing its result: see `ForgivingOutput`."""
-    given = sys.stdout
-    assert isinstance(given, io.TextIOWrapper)
-    given.flush()
-    output = ForgivingOutput(given)
-    sys.stdout = output
+    """Let standard output fail, or be closed, without stopping the work or losing its result: see `ForgivingOutput`."""
+    given, errors = sys.stdout, sys.stderr
+    output = ForgivingOutput(given if isinstance(given, io.TextIOWrapper) else _nowhere())
+    sys.stdout, sys.stderr = output, errors or _nowhere()
     try:
         yield output
     finally:
-        sys.stdout = given
+        sys.stdout, sys.stderr = given, errors
         output.flush()
         output.detach()
 
@@ -45,9 +43,11 @@ class ForgivingOutput(io.TextIOWrapper):
     """
 
     def __init__(self, stream: io.TextIOWrapper) -> None:
+        stream.flush()
         super().__init__(
             stream.buffer, stream.encoding, "backslashreplace", line_buffering=stream.line_buffering
         )
+        self.stream = stream  # which would close the buffer if it were gone
         self.failure: str | None = None
 
     def write(self, text: str) -> int:
@@ -92,6 +92,11 @@ def warnings_as_sentences() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = show
         yield
+
+
+def _nowhere() -> io.TextIOWrapper:
+    """Open what takes the place of a stream that is closed."""
+    return open(os.devnull, "w", encoding="utf-8")
 
 
 def say(text: str = "") -> None:

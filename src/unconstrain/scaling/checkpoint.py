@@ -3,17 +3,21 @@
 An archive that holds the accumulator with everything placed and its episodes dealt out to folds, and the sums so far.
 """
 
+import hashlib
+import json
 import os
+import warnings
 from dataclasses import dataclass, fields
 from typing import Any
 
-import joblib
+import numpy as np
+from sklearn.base import clone
 
 from unconstrain.errors import UnconstrainError
 from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
-from unconstrain.storage import Kind, foreign_parts, load_object, save_object
+from unconstrain.storage import Kind, encode, foreign_parts, load_object, save_object
 
 
 @dataclass(frozen=True)
@@ -58,12 +62,12 @@ def identity(policy: Policy, source: str, settings: dict[str, Any], partial: boo
         None if part is None else (part.H, part.g)
         for part in (policy.moments_ if partial and hasattr(policy, "accumulator_") else [])
     ]
-    about = (type(policy).__name__, policy.get_params(deep=True), learnt)
-    return {"policy": joblib.hash(about), "source": joblib.hash(source), "settings": joblib.hash(settings)}
+    about = [type(policy).__name__, clone(policy).get_params(deep=False), learnt]
+    return {"policy": _digest(about), "source": _digest(source), "settings": _digest(settings)}
 
 
 def save(path: str | os.PathLike[str], belongs_to: dict[str, str], progress: Progress) -> None:
-    """Write a checkpoint, whole or not at all.
+    """Write a checkpoint, whole or not at all, and warn where that fails: the work itself goes on.
 
     Parameters
     ----------
@@ -73,14 +77,12 @@ def save(path: str | os.PathLike[str], belongs_to: dict[str, str], progress: Pro
         As `identity` returned it.
     progress : Progress
         Where the stream stands.
-
-    Raises
-    ------
-    UnconstrainError
-        The place cannot be written to, or the policy holds something that cannot be saved, such as a lambda.
     """
     reached = {field.name: getattr(progress, field.name) for field in fields(Progress)}
-    save_object(path, Kind.CHECKPOINT, {"belongs_to": belongs_to, **reached})
+    try:
+        save_object(path, Kind.CHECKPOINT, {"belongs_to": belongs_to, **reached})
+    except UnconstrainError as error:
+        warnings.warn(f"{error}; the fit goes on without this checkpoint", stacklevel=2)
 
 
 def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy) -> Progress | None:
@@ -103,11 +105,13 @@ def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy
     Raises
     ------
     UnconstrainError
-        The file is damaged, is no checkpoint, or belongs to something else.
+        The file is damaged, is no checkpoint, or belongs to something else; or the policy holds something that cannot
+        be saved, such as a lambda.
     """
+    trusted = foreign_parts(given)  # which fails before the work where nothing could be saved
     if not os.path.lexists(path):
         return None
-    found = load_object(path, Kind.CHECKPOINT, dict, _check, trusted=foreign_parts(given))
+    found = load_object(path, Kind.CHECKPOINT, dict, _check, trusted=trusted)
     other = [what for what, value in belongs_to.items() if found["belongs_to"][what] != value]
     if other:
         raise UnconstrainError(
@@ -123,3 +127,13 @@ def _check(found: dict[str, Any]) -> None:
     wrong = [name for name, kind in kinds.items() if not isinstance(found[name], kind)]
     if wrong:
         raise TypeError(f"it holds another {wrong[0]}")
+
+
+def _digest(value: Any) -> str:
+    """Digest what a value consists of, whatever its type, as long as it can be saved."""
+    tree, arrays = encode(value)
+    digest = hashlib.blake2b(json.dumps(tree, sort_keys=True).encode(), digest_size=16)
+    for name, array in arrays.items():
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

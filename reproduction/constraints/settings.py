@@ -39,7 +39,7 @@ class Setting:
         The truth.
     estimator : FeatureConstraint or ConstantConstraint
         Not fitted yet.
-    starts : array (S, n)
+    starts : ndarray of shape (S, n)
         Of the movements.
     """
 

@@ -49,11 +49,11 @@ class Surfaces:
     ----------
     flat, curved : Demonstrations
         Recorded fingertips.
-    normal, plane : array (3,)
+    normal, plane : ndarray of shape (3,)
         The direction hardly moved in, and the normal of the plane through the points, on the flat surface.
     angle, uncertainty : float
         Between the two, and the standard error of the first, in degrees.
-    shares : array (3,)
+    shares : ndarray of shape (3,)
         Of the motion on the flat surface along each direction.
     flat_errors, curved_errors : dict of str to float
         nPOE on held-out blocks by kind of constraint.

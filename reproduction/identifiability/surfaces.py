@@ -28,15 +28,15 @@ class Surface:
     ----------
     name : str
         In words.
-    points : array (Q, 3)
+    points : ndarray of shape (Q, 3)
         The samples.
-    normals : array (Q, 3)
+    normals : ndarray of shape (Q, 3)
         Of the plane through this recording's points nearby.
-    unseen : array (Q, 3)
+    unseen : ndarray of shape (Q, 3)
         The direction least moved in there, by the report on both recordings together.
-    shares : array (Q,)
+    shares : ndarray of shape (Q,)
         Of the motion along it.
-    posterior_angles : array (Q,)
+    posterior_angles : ndarray of shape (Q,)
         Between the normal and the direction in which the policy deviates most, in degrees.
     """
 

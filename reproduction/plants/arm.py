@@ -106,7 +106,7 @@ def demonstrate(
 
     Parameters
     ----------
-    constraint : str, array, or TaskConstraint
+    constraint : str, array_like, or TaskConstraint
         On the hand: task rows "1-2-3", the normal of a plane, or a matrix; see `TaskConstraint.parse`.
     policy : PowerPolicy, optional
         By default the linear one.
@@ -149,7 +149,7 @@ def follow(
         On the hand.
     policy : object with ``predict(X)``, or callable ``X -> U``
         Over joint angles: the true one, or one that was learnt.
-    starts : array (S, 7) or (7,)
+    starts : array_like of shape (S, 7) or (7,)
         In radians.
     length : int
         Number of samples of each trajectory.

@@ -67,14 +67,14 @@ class PhysicalRecording:
         Recorded joint angles (rad) with encoder noise, and their velocities (rad/s) by differentiation; time in
         seconds; the true policy at the true joint angles; N of the ideal constraint at them (where the hand does
         not touch the table, I).
-    contact_force : array (N, 3)
+    contact_force : ndarray of shape (N, 3)
         Force of the constraint on the hand in newtons, in the world: of the table on the tip, along its normal. Not
         measured (NaN) where the hand is gripped.
-    touching : array (N,) of bool
+    touching : ndarray of shape (N,), bool
         Whether the constraint held at the sample.
-    normals : array (N, 3)
+    normals : ndarray of shape (N, 3)
         The table's normal; NaN where the hand is gripped.
-    tables : array (episodes, 7)
+    tables : ndarray of shape (episodes, 7)
         Position and quaternion of the table of each episode; NaN where the hand is gripped.
     """
 
@@ -96,7 +96,7 @@ class PhysicalRecording:
 
         Returns
         -------
-        array (N,)
+        ndarray of shape (N,)
             In radians; NaN where either is zero.
         """
         ideal, actions = self.ideal, self.demonstrations.actions

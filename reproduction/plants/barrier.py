@@ -23,9 +23,9 @@ class Wall:
 
     Parameters
     ----------
-    points : array (S, 3)
+    points : ndarray of shape (S, 3)
         A point of each plane, in metres.
-    normals : array (S, 3)
+    normals : ndarray of shape (S, 3)
         Unit length, pointing out of the wall to where the robot is.
     """
 
@@ -44,7 +44,7 @@ class Barrier:
 
     Parameters
     ----------
-    low, high : arrays (S, K, 3)
+    low, high : ndarray of shape (S, K, 3)
         Corners of the boxes, in metres. A box without volume is no obstacle.
     """
 
@@ -84,7 +84,7 @@ def make_with_gap(
 
     Parameters
     ----------
-    widths : array (S,)
+    widths : array_like of shape (S,)
         Width of the gap in metres; at zero and below there is none.
     x, bottom : float
         Distance in front of the robot to the barrier's middle, and height of its foot, in metres.
@@ -132,16 +132,16 @@ def find_blocking(
     ----------
     obstacle : Wall or Barrier
         For S movements and K boxes (a wall is one).
-    hands, velocities : arrays (S, H, 3)
+    hands, velocities : ndarray of shape (S, H, 3)
         Where each of H hands is (m), and how the policy would move it (m/s).
     clearance : float
         In metres.
 
     Returns
     -------
-    rows : array (S, H, K, 3)
+    rows : ndarray of shape (S, H, K, 3)
         Normals n with ``nᵀ ẋ = 0``; zero where nothing is in the way.
-    blocked : array (S, H) of bool
+    blocked : ndarray of shape (S, H), bool
         Which hands have a normal that is not zero.
     """
     rows = []

@@ -35,9 +35,9 @@ class Contacts:
 
     Attributes
     ----------
-    distances : array (m,)
+    distances : ndarray of shape (m,)
         Signed distances in metres, negative inside.
-    rows : array (m, 3)
+    rows : ndarray of shape (m, 3)
         Their gradients over the joints.
     """
 
@@ -115,7 +115,7 @@ class Finger:
 
         Parameters
         ----------
-        starts : array (3,) or (S, 3)
+        starts : array_like of shape (3,) or (S, 3)
             Joint angles in radians, clear of the obstacles.
         obstacles : Box, sequence of Box, or one sequence of Box per start
             What lies in the way; nothing by default.

@@ -37,7 +37,7 @@ class Attractor:
 
     Parameters
     ----------
-    target : array (6,)
+    target : ndarray of shape (6,)
         x_c, where the hands grasp, in metres.
     """
 
@@ -57,14 +57,14 @@ def constrain(obstacle: Barrier | None, X: Array, Pi: Array) -> tuple[Array, NDA
     ----------
     obstacle : Barrier or None
         One for each of S movements.
-    X, Pi : array (S, 6)
+    X, Pi : ndarray of shape (S, 6)
         The hands' positions, and how the policy would move them, in m and m/s.
 
     Returns
     -------
-    projections : array (S, 6, 6)
+    projections : ndarray of shape (S, 6, 6)
         N.
-    blocked : array (S, 2) of bool
+    blocked : ndarray of shape (S, 2), bool
         Which hands the obstacle stops.
     """
     S = len(X)
@@ -85,11 +85,11 @@ class Recording:
     ----------
     demonstrations : Demonstrations
         Hands' realised positions (m) and velocities (m/s), the true policy and projections.
-    blocked : array (N, 2) of bool
+    blocked : ndarray of shape (N, 2), bool
         Which hand the barrier stops.
     tracking : float
         Root mean square of realised minus commanded velocity, as a share of the commanded.
-    postures : array (S, length, nq)
+    postures : ndarray of shape (S, length, nq)
         The whole body's, to be shown.
     """
 

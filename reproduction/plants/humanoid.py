@@ -37,7 +37,7 @@ class Humanoid:
         Frames of the left and the right hand.
     feet : (str, str) or None
         Frames of the feet that whole-body motion keeps on the floor; None for a base that stands still.
-    home : array (n,)
+    home : ndarray of shape (n,)
         The default standing posture q0: the file's keyframe "home", or else all joints at zero, moved into the limits.
     """
 
@@ -110,14 +110,14 @@ class Humanoid:
 
         Parameters
         ----------
-        Q : array (N, n)
+        Q : ndarray of shape (N, n)
             Postures, in radians.
 
         Returns
         -------
-        positions : array (N, 2, 3)
+        positions : ndarray of shape (N, 2, 3)
             Of both hands in metres, left first.
-        jacobians : array (N, 2, 3, n)
+        jacobians : ndarray of shape (N, 2, 3, n)
             Of the positions.
         """
         mj, model, data = import_mujoco(), self.robot.model, self._data

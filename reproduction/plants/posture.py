@@ -68,7 +68,7 @@ def demonstrate(
     demonstrations : Demonstrations
         ``n_episodes * length`` samples over the humanoid's joints, in radians and radians per step, with the true
         policy and projections. Time counts steps.
-    blocked : array (N,) of bool
+    blocked : ndarray of shape (N,), bool
         Samples at which the wall stops a hand.
     """
     rng = np.random.default_rng(random_state)

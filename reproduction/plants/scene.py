@@ -30,7 +30,7 @@ class Scene:
 
     Parameters
     ----------
-    origin : array (3,)
+    origin : ndarray of shape (3,)
         Midway between the hands in the robot's home posture; the offsets below count from there.
     floor : float
         Height of the floor the table stands on.

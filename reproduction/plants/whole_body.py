@@ -134,14 +134,14 @@ class WholeBody:
 
         Parameters
         ----------
-        velocities : array (2, 3)
+        velocities : ndarray of shape (2, 3)
             In m/s, left hand first.
         dt : float
             For how many seconds.
 
         Returns
         -------
-        array (2, 3)
+        ndarray of shape (2, 3)
             The velocities the hands really had when the motion began, J q̇. Their difference from those asked for is
             the tracking error of whole-body control.
         """

@@ -7,7 +7,7 @@ import numpy as np
 from reproduction.arm.trial import make_candidates
 from reproduction.constraints.trial import SETTINGS
 from reproduction.grasp.trial import make_demonstrator, record_training
-from reproduction.plants import arm, arm_dynamics
+from reproduction.plants import arm, arm_dynamics, arm_stage
 from reproduction.plants.robot_choice import OUR_OWN
 from reproduction.scores import nupe
 from unconstrain.constraints import from_forces
@@ -39,16 +39,16 @@ def _run_arm(seed: int) -> dict[str, Any]:
     """Measure nUPE on new starts, by inconsistency and with the constraints read off a noisy force sensor."""
     policy = arm.PowerPolicy(1.8, 0.5)
     recording = arm_dynamics.demonstrate(
-        arm_dynamics.TABLE, policy, PHYSICS_EPISODES + PHYSICS_NEW, random_state=seed
+        arm_stage.TABLE, policy, PHYSICS_EPISODES + PHYSICS_NEW, random_state=seed
     )
     D, rng = recording.demonstrations, np.random.default_rng([seed, 3])
     forces = recording.contact_force + SENSOR_NOISE * rng.normal(size=recording.contact_force.shape)
-    robot = arm_dynamics.stage(arm_dynamics.TABLE)
+    robot = arm_stage.stage(arm_stage.TABLE)
     N = from_forces(
         forces,
         THRESHOLD,
         actions=D.actions,
-        jacobian=robot.jacobian(D.states, arm_dynamics.TIP)[:, :3],
+        jacobian=robot.jacobian(D.states, arm_stage.TIP)[:, :3],
         margin=MARGIN,
         episodes=D.episodes,
     )

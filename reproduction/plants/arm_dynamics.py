@@ -11,12 +11,12 @@ leaves the movement is measured, not assumed.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reproduction.plants import arm
+from reproduction.plants.arm_stage import GRIPPED, TIMESTEP, TIP, TIP_RADIUS, stage
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
@@ -25,12 +25,6 @@ from unconstrain.robots import Robot, import_mujoco
 from unconstrain.simulation import simulate
 
 Array = NDArray[np.float64]
-
-TIMESTEP = 0.001
-"""Seconds: dynamics and servos run at 1 kHz."""
-
-SERVO_GAIN = 50.0
-"""k in N m s/rad, the same in all joints."""
 
 ENCODER_NOISE = 1e-4
 """Standard deviation of recorded joint angles, in radians; 0.006°."""
@@ -44,17 +38,14 @@ RATE = 50.0
 WINDOW = 0.2
 """Seconds of recording that a velocity is taken from."""
 
-GRIPPED, TABLE = "gripped", "table"
-SCENARIOS = (GRIPPED, TABLE)
-
-TIP = "tip"
-"""Middle of the sphere at the end of the arm: what slides on the table."""
-TIP_RADIUS = 0.018
-
-# Of the table below the hanging arm: depth under the base in metres, tilt in radians, both uniform.
 DEPTH = (0.85, 1.0)
+"""Of the table under the base of the hanging arm, in metres, uniform."""
+
 TILT = np.radians(20.0)
+"""Largest tilt of the table, in radians; uniform from zero."""
+
 CLEARANCE = 0.02
+"""Of the tip above the table at a start, at least, in metres."""
 
 
 @dataclass(frozen=True)
@@ -104,33 +95,6 @@ class PhysicalRecording:
         along = np.einsum("ni,ni->n", ideal, actions)
         cosine = np.divide(along, lengths, out=np.full_like(along, np.nan), where=lengths > 0)
         return np.arccos(np.clip(cosine, -1.0, 1.0))
-
-
-def stage(scenario: str) -> Robot:
-    """Equip the arm with servos, and with what constrains it: a grip on the hand, or a table it hangs above.
-
-    Raises `UnconstrainError` for an unknown scenario, or where the extra `sim` is not installed.
-    """
-    mujoco = import_mujoco()
-    if scenario not in SCENARIOS:
-        raise UnconstrainError(f"there is no scenario {scenario!r}: choose one of {', '.join(SCENARIOS)}")
-    spec = arm.load_robot().spec.copy()
-    spec.option.timestep = TIMESTEP
-    # Servo and joint damping are stiff at this gain; the implicit integrator takes them in its stride.
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # Its controller compensates gravity, as that of the real arm does.
-    spec.option.gravity = [0.0, 0.0, 0.0]
-    for i in range(arm.JOINTS):
-        servo = spec.add_actuator(name=f"servo{i + 1}", target=f"joint{i + 1}")
-        servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
-        servo.set_to_velocity(kv=SERVO_GAIN)
-    last = spec.body("link7")
-    last.add_site(name=TIP, pos=[0, 0, arm.OFFSETS[-1] - TIP_RADIUS], size=[1.2 * TIP_RADIUS] * 3)
-    if scenario == GRIPPED:
-        _add_grip(spec)
-    else:
-        _add_table(spec)
-    return Robot(spec)
 
 
 def demonstrate(
@@ -243,30 +207,6 @@ def _simulate(
     return states[:, settling::every], np.stack(forces[settling::every], axis=1)
 
 
-def _add_grip(spec: Any) -> None:
-    mujoco = import_mujoco()
-    grip = spec.worldbody.add_body(name="grip", mocap=True)
-    grip.add_site(name="held", size=[0.03] * 3, rgba=[0.0, 0.45, 0.7, 0.6])
-    hold = spec.add_equality(name="hold", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE)
-    hold.name1, hold.name2 = arm.HAND, "held"
-    # As stiff as the time step allows, and nearly without give: the hand stays within fractions of a millimetre.
-    hold.solref, hold.solimp = [2 * TIMESTEP, 1.0], [0.999, 0.9999, 0.001, 0.5, 2.0]
-
-
-def _add_table(spec: Any) -> None:
-    mujoco = import_mujoco()
-    spec.body("base").quat = [0.0, 1.0, 0.0, 0.0]  # hangs from the ceiling
-    table = spec.worldbody.add_body(name="table", mocap=True)
-    top = table.add_geom(name="top", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.75, 0.75, 0.01])
-    top.rgba = [0.62, 0.5, 0.38, 1.0]
-    tip = next(geom for geom in spec.geoms if geom.name == "fingertip")
-    for geom in (top, tip):
-        geom.contype, geom.conaffinity, geom.condim = 1, 1, 1  # one dimension: no friction
-        geom.solref, geom.solimp = [2 * TIMESTEP, 1.0], [0.999, 0.9999, 0.001, 0.5, 2.0]
-    sensor = spec.add_sensor(name="touch", type=mujoco.mjtSensor.mjSENS_TOUCH, objname=TIP)
-    sensor.objtype = mujoco.mjtObj.mjOBJ_SITE
-
-
 def _above_tables(robot: Robot, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
     """Draw starts (count, 7) whose tip is above their table, and the tables' positions and quaternions (count, 7)."""
     starts, tables = np.empty((count, arm.JOINTS)), np.empty((count, 7))
@@ -291,15 +231,3 @@ def _normals(tables: Array) -> Array:
     """Compute the z axes (N, 3) of tables (N, 7)."""
     w, x, y, z = tables[:, 3:].T
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x**2 + y**2)], axis=1)
-
-
-def stage_episode(recording: PhysicalRecording, scenario: str, episode: int) -> Robot:
-    """Stage the arm with the grip or the table where it was in an episode, to be drawn."""
-    spec = stage(scenario).spec.copy()
-    if scenario == GRIPPED:
-        start = recording.demonstrations.episode(episode).states[:1]
-        spec.body("grip").pos = arm.pose(start)[0][0]
-    else:
-        spec.body("table").pos = recording.tables[episode, :3]
-        spec.body("table").quat = recording.tables[episode, 3:]
-    return Robot(spec)

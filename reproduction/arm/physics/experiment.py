@@ -11,7 +11,7 @@ from reproduction.arm.physics.tables import list_findings, write_table
 from reproduction.arm.physics.trial import EPISODES, GAIN, NEW_EPISODES, POWER, SETTINGS, run_trial
 from reproduction.outcome import Outcome, write_figures, write_json
 from reproduction.plants import arm_dynamics
-from reproduction.plants.arm_dynamics import SCENARIOS
+from reproduction.plants.arm_stage import SCENARIOS, SERVO_GAIN
 from reproduction.plants.rendering import NoOpenGL
 from reproduction.trials import run_trials
 from unconstrain import plot
@@ -22,7 +22,7 @@ TRIALS = 50
 CHOICES = (
     f"p = {POWER}; a step of the paper lasts 0.1 s, so π = -{GAIN} ∇Φ in rad/s.",
     f"{EPISODES} trajectories of 4 s at 50 Hz to learn from, and {NEW_EPISODES} from new starts to test on.",
-    f"Servo gain {arm_dynamics.SERVO_GAIN:g} N m s/rad in all joints; gravity compensated, as the arm's own "
+    f"Servo gain {SERVO_GAIN:g} N m s/rad in all joints; gravity compensated, as the arm's own "
     "controller does; the table without friction.",
     f"Encoder noise {arm_dynamics.ENCODER_NOISE:g} rad; velocities by Savitzky-Golay over {arm_dynamics.WINDOW:g} s.",
     "The arm hangs over the table, so that its policy leads the hand down to it; the table's depth is uniform in "

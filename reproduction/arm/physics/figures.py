@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from reproduction.arm.physics.trial import GAIN, METHODS, NAMES, POWER, Result, collect
 from reproduction.plants import arm_dynamics
 from reproduction.plants.arm import PowerPolicy
-from reproduction.plants.arm_dynamics import GRIPPED, SCENARIOS
+from reproduction.plants.arm_stage import GRIPPED, SCENARIOS, stage_episode
 from reproduction.plants.rendering import Camera
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 
@@ -44,7 +44,7 @@ def render_frames(seed: int = 0) -> Figure:
             scenario, PowerPolicy(POWER, GAIN), 1, encoder_noise=0.0, random_state=seed
         )
         demos = recording.demonstrations
-        robot = arm_dynamics.stage_episode(recording, scenario, episode=0)
+        robot = stage_episode(scenario, demos.states[0], recording.tables[0])
         middle = 0.6 if scenario == GRIPPED else -0.65
         with Camera(robot.model, 720, 640, at=(0.0, 0.0, middle), **VIEW) as view:
             for ax, second in zip(axes, FRAMES, strict=True):

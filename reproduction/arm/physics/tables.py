@@ -2,7 +2,7 @@
 
 from reproduction import markdown
 from reproduction.arm.physics.trial import METHODS, NAMES, Result, collect
-from reproduction.plants.arm_dynamics import SCENARIOS
+from reproduction.plants.arm_stage import SCENARIOS
 
 
 def write_table(results: list[Result]) -> str:

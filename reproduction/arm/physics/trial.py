@@ -7,7 +7,7 @@ import numpy as np
 from reproduction.arm.trial import make_candidates, make_local_models
 from reproduction.plants import arm_dynamics
 from reproduction.plants.arm import PowerPolicy
-from reproduction.plants.arm_dynamics import GRIPPED, TABLE
+from reproduction.plants.arm_stage import GRIPPED, SERVO_GAIN, TABLE
 from reproduction.scores import nupe_and_ncpe
 from unconstrain.selection import select_policy
 
@@ -23,7 +23,7 @@ SETTINGS = {
     "new episodes": NEW_EPISODES,
     "p": POWER,
     "gain": GAIN,
-    "servo": arm_dynamics.SERVO_GAIN,
+    "servo": SERVO_GAIN,
     "noise": arm_dynamics.ENCODER_NOISE,
     "window": arm_dynamics.WINDOW,
 }

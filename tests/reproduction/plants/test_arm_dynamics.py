@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from reproduction.plants import arm, arm_dynamics
-from reproduction.plants.arm_dynamics import GRIPPED, SCENARIOS, TABLE, TIP, TIP_RADIUS
+from reproduction.plants.arm_stage import GRIPPED, SCENARIOS, SERVO_GAIN, TABLE, TIP, TIP_RADIUS, stage
 from unconstrain.errors import UnconstrainError
 
 RECORDED = {
@@ -33,7 +33,7 @@ def test_a_gripped_hand_stays():
 
 def test_a_tip_touches_the_table_and_is_pushed_along_its_normal():
     recording = RECORDED[TABLE]
-    robot, touching = arm_dynamics.stage(TABLE), recording.touching
+    robot, touching = stage(TABLE), recording.touching
     tip, _ = robot.pose(recording.demonstrations.states, TIP)
     table = recording.tables[recording.demonstrations.episodes, :3]
     height = np.einsum("ni,ni->n", tip - table, recording.normals) - TIP_RADIUS
@@ -47,7 +47,7 @@ def test_a_tip_touches_the_table_and_is_pushed_along_its_normal():
     # Quasi-static: the servo's pull along the joints is what the table answers, k (π - q̇) = -Jᵀ f.
     J = robot.jacobian(recording.demonstrations.states, TIP)[:, :3]
     demos = recording.demonstrations
-    pull = arm_dynamics.SERVO_GAIN * (demos.policy - demos.actions)
+    pull = SERVO_GAIN * (demos.policy - demos.actions)
     answer = -np.einsum("nij,ni->nj", J, recording.contact_force)
     assert np.median(np.linalg.norm(pull - answer, axis=1)[touching]) < 0.05 * np.median(
         np.linalg.norm(answer, axis=1)[touching]

@@ -83,9 +83,11 @@ def fit(
     if checkpoint is not None or cluster is not None or (recorded.is_large and not named):
         if named:
             raise PolicyError(f"{named[0]} needs all data in memory, and a stream is read once: leave it out")
+        from unconstrain.scaling.summary import describe_fit
+
         policy = _fit_stream(recorded, model, checkpoint, cluster)
         policy.save(out, resumable=resumable)
-        _describe_stream(policy)
+        reporting.say(describe_fit(policy))
         _suggest(out)
         return
     with working("reading"):
@@ -186,22 +188,3 @@ def _fit_stream(
             distributed.fit(policy, source, client, **how, progress=True)
     policy.recording_ = recorded.kept()
     return policy
-
-
-def _describe_stream(policy: "Policy") -> None:
-    accumulator = policy.resume()
-    episodes = f" in {accumulator.folds.n_dealt:,} episodes" if accumulator.folds is not None else ""
-    reporting.say(f"read: {policy.n_samples_seen_:,} samples{episodes}")
-    if policy.n_known_constraints_:
-        share = policy.n_known_constraints_ / policy.n_samples_seen_
-        reporting.say(f"constraints: known of {share:.1%} of the samples")
-    reporting.say(f"zero actions: {policy.n_zero_actions_:,} without a direction")
-    if not hasattr(policy, "held_out_risk_"):
-        return
-    total = accumulator.moments()
-    error = float(policy.held_out_risk_[policy.alphas_ == policy.alpha_][0])
-    motion = float(total.squares.sum() / total.weight.sum())
-    each = ", of the local models each by itself" if total.weight.ndim else ""
-    explained = f", {1 - error / motion:.2%} of observed motion explained" if motion else ""
-    reporting.say(f"λ: {policy.alpha_:.3g} (chosen by cross-validation)")
-    reporting.say(f"held-out risk{each}: {error:.4g}{explained}")

@@ -104,7 +104,7 @@ def _local_policy() -> uc.LocallyLinearPolicy:
 
 
 def _stream(policy, folder: str):
-    return uc.fit_stream(policy, folder, state=STATE, action=ACTION)
+    return uc.fit_stream(policy, uc.open(folder, state=STATE, action=ACTION))
 
 
 def _child(task: str, folder: str) -> list[float]:

@@ -20,7 +20,7 @@ from reproduction.plants.arm_stage import GRIPPED, TIMESTEP, TIP, TIP_RADIUS, st
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
-from unconstrain.recordings.differentiate import differentiate
+from unconstrain.recordings.derivative import differentiate
 from unconstrain.robots import Robot, import_mujoco
 from unconstrain.simulation import simulate
 

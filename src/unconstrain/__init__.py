@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
     from unconstrain.fitting import moments
     from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
-    from unconstrain.recordings import load, save
+    from unconstrain.recordings import Columns, Preparation, Recordings, load, open
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
     from unconstrain.selection import select_policy
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Columns",
     "ConstantConstraint",
     "ConstraintChain",
     "DecoupledFeatures",
@@ -44,6 +45,8 @@ __all__ = [
     "NullspaceComponent",
     "ParametricPolicy",
     "PotentialFeatures",
+    "Preparation",
+    "Recordings",
     "constraints",
     "distributed",
     "errors",
@@ -56,9 +59,9 @@ __all__ = [
     "load_policy",
     "metrics",
     "moments",
+    "open",
     "plot",
     "robots",
-    "save",
     "select_policy",
 ]
 
@@ -74,7 +77,7 @@ _HOMES = {
     "unconstrain.diagnostics": ("identifiability",),
     "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
     "unconstrain.policies": ("LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"),
-    "unconstrain.recordings": ("load", "save"),
+    "unconstrain.recordings": ("Columns", "Preparation", "Recordings", "load", "open"),
     "unconstrain.scaling.stream": ("fit_stream",),
     "unconstrain.selection": ("select_policy",),
     "unconstrain.version": ("__version__",),

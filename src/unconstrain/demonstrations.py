@@ -1,13 +1,18 @@
 """Demonstrations: what a person did, sample by sample, and from which recording each sample comes."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.errors import DataError
+from unconstrain import demonstrations_file
+from unconstrain.errors import DataError, UnconstrainError, printable
+
+if TYPE_CHECKING:
+    import pandas
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -41,7 +46,7 @@ class Demonstrations:
     episode_labels : sequence of str, optional
         One per episode, each used.
     notes : sequence of str, optional
-        What whoever uses the data should know of its reading, a sentence each.
+        What a user of the data should know of its reading, a sentence each.
 
     Attributes
     ----------
@@ -108,7 +113,7 @@ class Demonstrations:
             object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
-        """The number of samples N."""
+        """Return the number of samples N."""
         return len(self.states)
 
     @property
@@ -117,9 +122,17 @@ class Demonstrations:
         return len(self.episode_labels)
 
     def select(self, samples: ArrayLike | slice) -> "Demonstrations":
-        """The samples of a boolean mask (N,), an array of indices, or a slice.
+        """Return some of the samples.
 
         Everything is kept consistent: episodes left without samples disappear and the rest are renumbered.
+
+        Parameters
+        ----------
+        samples : array (N,) of bool, array of int, or slice
+
+        Returns
+        -------
+        Demonstrations
 
         Raises
         ------
@@ -142,7 +155,15 @@ class Demonstrations:
         )
 
     def episode(self, which: int | str) -> "Demonstrations":
-        """One episode, by its code or its label.
+        """Return one episode, by its code or its label.
+
+        Parameters
+        ----------
+        which : int or str
+
+        Returns
+        -------
+        Demonstrations
 
         Raises
         ------
@@ -162,13 +183,22 @@ class Demonstrations:
         return self.select(self.episodes == which)
 
     def blocks(self, k: int) -> Codes:
-        """Labels (N,) that cut every episode into `k` contiguous blocks: `k * episode + block`.
+        """Cut every episode into `k` contiguous blocks.
 
         Neighbouring samples of a recording resemble each other, so folds of single samples flatter a
         policy. With many episodes, pass `episodes` as `groups=`. With one or a few long recordings, pass
         these labels instead, and cross-validation runs over blocks within each recording.
 
         An episode of m samples gives block ⌊k i / m⌋ to its i-th; with m < k some labels stay unused.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        array (N,)
+            Labels, ``k * episode + block``.
 
         Raises
         ------
@@ -211,9 +241,18 @@ class Demonstrations:
         return self.episodes
 
     def moving(self, min_speed: float) -> "Demonstrations":
-        """Only the samples with ‖u‖ ≥ `min_speed` (units of the actions), and a note of how many went.
+        """Leave out samples whose action is short, with a note of how many went.
 
         The policy is read off the direction of the action, û = u / ‖u‖, which is noise when the hand rests.
+
+        Parameters
+        ----------
+        min_speed : float
+            The least ‖u‖ that stays, in the units of the actions.
+
+        Returns
+        -------
+        Demonstrations
 
         Raises
         ------
@@ -238,10 +277,19 @@ class Demonstrations:
 
     @classmethod
     def concatenate(cls, several: Sequence["Demonstrations"]) -> "Demonstrations":
-        """One after the other; the episodes stay distinct, and a label already taken gets a number.
+        """Join several, one after the other.
 
-        Time, true policy, projections, forces and free flags are kept where every one of them has them,
-        otherwise left out with a note. Names are those of the first.
+        The episodes stay distinct, and a label already taken gets a number. Time, true policy, projections, forces
+        and free flags are kept where every one of them has them, otherwise left out with a note.
+
+        Parameters
+        ----------
+        several : sequence of Demonstrations
+
+        Returns
+        -------
+        Demonstrations
+            With the names of the first.
 
         Raises
         ------
@@ -296,6 +344,50 @@ class Demonstrations:
             notes=tuple(dict.fromkeys(notes)),
         )
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write to an NPZ or Parquet file, by suffix; ``unconstrain.load(path)`` gives the same back.
+
+        NPZ holds the arrays under the names of the attributes. Parquet holds one column per state, action and
+        true-policy dimension, forces and free flags likewise, the projections as lists of d², row by row, and in its
+        schema metadata, as JSON, which columns play which role.
+
+        Parameters
+        ----------
+        path : path
+            Ends in ``.npz``, ``.parquet`` or ``.pq``.
+
+        Raises
+        ------
+        UnconstrainError
+            Another suffix, or a place that cannot be written to.
+        """
+        demonstrations_file.write(self, path)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a data frame with a row for each sample.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The columns are those of a Parquet file that `save` writes: ``episode``, here by its label, ``time``, the
+            states, the actions, and what else there is; a projection is an array (d, d).
+
+        Raises
+        ------
+        UnconstrainError
+            pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise UnconstrainError(
+                "to_pandas needs pandas, which is not installed: pip install pandas"
+            ) from error
+        columns, roles = demonstrations_file.columns_of(self)
+        labels = np.array(self.episode_labels, dtype=object)[self.episodes]
+        plain = {name: list(values) if values.ndim > 1 else values for name, values in columns.items()}
+        return pandas.DataFrame(plain | {roles["episodes"]: labels})
+
     def __repr__(self) -> str:
         optional = ("time", "policy", "projections", "forces", "free")
         extras = [what for what in optional if getattr(self, what) is not None]
@@ -306,7 +398,7 @@ class Demonstrations:
             *([f"with {', '.join(extras)}"] if extras else []),
             *([_count(len(self.notes), "note")] if self.notes else []),
         ]
-        return f"Demonstrations({'; '.join(parts)})"
+        return printable(f"Demonstrations({'; '.join(parts)})")
 
 
 def _numbers(what: str, values: ArrayLike) -> Array:

@@ -1,13 +1,34 @@
-"""The family of mistakes a user can make.
+"""Errors that a user can cause, each one sentence.
 
-Every one is raised with a single sentence that names the file, column or row and says what to do. The
-command line prints that sentence and exits with 2; in Python they are all `ValueError`s, as scikit-learn
-expects of bad input.
+Each message names the file, column or row, and says what to do. A message speaks of an argument or option as ``name=``,
+which the command line turns into ``--name``. The command line prints the sentence and exits with 2; in Python all
+of them are `ValueError`, as scikit-learn expects of bad input.
 """
+
+
+def printable(text: str) -> str:
+    r"""Spell out the control characters of a text, of which terminals would make something.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+        The text, with ``\x1b`` in place of an escape character, for example.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class UnconstrainError(ValueError):
     """A mistake in what the user gave, told in one sentence. Base of the family."""
+
+    def __init__(self, message: str = "") -> None:
+        # Names of files and columns are the user's, or a stranger's: no escape sequence reaches the terminal.
+        super().__init__(printable(str(message)))
 
 
 class DataError(UnconstrainError):

@@ -101,7 +101,7 @@ def test_what_is_known_of_constraints_is_used(run, touched, where):
 def test_files_that_uc_save_wrote_need_no_more_than_the_columns_that_tell(run, tmp_path):
     demos = uc.Demonstrations(X, U, EPISODES, free=known.TOUCHED["free"])
     (tmp_path / "saved").mkdir()
-    uc.save(demos, tmp_path / "saved" / "a.parquet")
+    demos.save(tmp_path / "saved" / "a.parquet")
     code, out, err = run("fit", "saved", "--model", "linear", "--free", "free")
     assert code == 0, err
     assert f"constraints: known of {demos.free.mean():.1%} of the samples" in out

@@ -51,7 +51,7 @@ def test_forces_and_flags_are_loaded_saved_and_used(tmp_path):
     )
     np.testing.assert_allclose(demos.forces, forces)
     for suffix in (".npz", ".parquet"):
-        uc.save(demos, tmp_path / f"saved{suffix}")
+        demos.save(tmp_path / f"saved{suffix}")
         back = uc.load(tmp_path / f"saved{suffix}")
         np.testing.assert_array_equal(back.forces, demos.forces)
         np.testing.assert_array_equal(back.free, demos.free)

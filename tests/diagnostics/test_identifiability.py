@@ -228,7 +228,7 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
     """`fit` warns, `diagnose` says where and what next and draws it, `rollout` ends where nothing is known."""
     demos = toy.demonstrate(4, random_state=0)
     recording, saved = str(tmp_path / "toy.npz"), str(tmp_path / "toy.skops")
-    uc.save(demos, recording)
+    demos.save(recording)
     model = ["--model", "rbf", "--width", "0.3", "--centers", "grid", "--alpha", "1e-6"]
     _, out, _ = run("fit", recording, *model, "--out", saved)
     assert "is not determined by these recordings; `unconstrain diagnose`" in out

@@ -28,12 +28,14 @@ def test_known_layouts_need_no_columns(tmp_path, version):
 def test_components_go_by_the_names_the_dataset_gives_them(tmp_path, names):
     folder = written.lerobot(tmp_path / "robot", X, U, EPISODES, TIME, names=names)
     policy = fit_stream(
-        uc.ParametricPolicy(alpha=1e-6), folder, state=["grip.pos", "pan.pos"], action="lift.pos"
+        uc.ParametricPolicy(alpha=1e-6), uc.open(folder, state=["grip.pos", "pan.pos"], action="lift.pos")
     )
     whole = uc.ParametricPolicy(alpha=1e-6).fit(X32[:, [2, 0]], U32[:, [1]])
     assert_same_fit(policy, whole, X32[:, [2, 0]])
     by_place = ["observation.state[2]", "observation.state[0]"]
-    policy = fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, state=by_place, action=["action[1]"])
+    policy = fit_stream(
+        uc.ParametricPolicy(alpha=1e-6), uc.open(folder, state=by_place, action=["action[1]"])
+    )
     assert_same_fit(policy, whole, X32[:, [2, 0]])
 
 
@@ -51,7 +53,9 @@ def test_action_may_be_the_derivative_of_the_state(tmp_path, version):
     paths = sorted((folder / "data").rglob("*.parquet"))
     demos = uc.load(paths, "observation.state", time="timestamp", episode="episode_index")
     whole = uc.ParametricPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
-    policy = fit_stream(uc.ParametricPolicy(alpha="cv"), folder, action="differentiate", batch_rows=100)
+    policy = fit_stream(
+        uc.ParametricPolicy(alpha="cv"), uc.open(folder, action="differentiate"), batch_rows=100
+    )
     assert_same_fit(policy, whole, X32)
 
 
@@ -69,7 +73,7 @@ def changed(folder, **changes):
         (lambda f: (f / "meta" / "info.json").write_text("{"), "info.json is damaged"),
         (
             lambda f: (f / "data" / "chunk-000" / "file-001.parquet").write_text(""),
-            "file-001.parquet is damaged",
+            "file-001.parquet is empty",
         ),
     ],
 )
@@ -87,6 +91,6 @@ def test_files_come_in_the_order_of_their_numbers(tmp_path):
     for i, name in reversed(list(enumerate(names))):
         (folder / f"part-{i}.parquet").rename(folder / name)
     policy = fit_stream(
-        uc.ParametricPolicy(alpha="cv"), folder, state="x0", action="u0", episode="episode_index"
+        uc.ParametricPolicy(alpha="cv"), uc.open(folder, state="x0", action="u0", episode="episode_index")
     )
     assert list(policy.resume().folds.fold_of) == np.unique(EPISODES).tolist()

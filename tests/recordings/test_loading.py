@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.recordings import load, save
+from unconstrain.recordings import load
 
 RECORDED = Path(__file__).resolve().parents[2] / ".." / "shared" / "data"
 recorded = pytest.mark.skipif(not RECORDED.is_dir(), reason="the recorded data are not beside the project")
@@ -211,7 +211,7 @@ def test_nanoseconds_lose_nothing(tmp_path):
 def test_a_doubtful_unit_is_noted(tmp_path):
     path = written(tmp_path / "a.csv", rows("t,x", (TIME * 1e3).astype(int), TIME))
     (note,) = load(path, state="x", time="t").notes
-    assert note == "a.csv: time read in s has a typical step of 20 s; if that is wrong, give time_unit"
+    assert note == "a.csv: time read in s has a typical step of 20 s; if that is wrong, give time_unit="
 
 
 def test_a_gap_splits_and_short_fragments_go(tmp_path):
@@ -298,7 +298,7 @@ def test_what_is_saved_comes_back_exactly(tmp_path, data, suffix):
         notes=data.draw(st.lists(names, max_size=2)),
     )
     path = tmp_path / f"saved{suffix}"
-    save(demos, path)
+    demos.save(path)
     assert same(load(path), demos)
 
 
@@ -306,7 +306,7 @@ def test_saved_parquet_is_plain_to_others_and_may_be_filtered(tmp_path):
     demos = Demonstrations(
         LINE, LINE, np.repeat([0, 1, 2], 20), TIME, state_names=["x", "y"], action_names=["x", "w"]
     )
-    save(demos, tmp_path / "a.parquet")
+    demos.save(tmp_path / "a.parquet")
     table = pq.read_table(tmp_path / "a.parquet")
     assert table.column_names == ["episode", "time", "x", "y", "x_2", "w"]
     pq.write_table(table.slice(20), tmp_path / "b.parquet")
@@ -318,7 +318,7 @@ def test_saved_parquet_is_plain_to_others_and_may_be_filtered(tmp_path):
 def test_save_leaves_nothing_where_it_fails(tmp_path):
     demos = Demonstrations(LINE, LINE)
     with pytest.raises(DataError, match=r"ends in .npz or .parquet"):
-        save(demos, tmp_path / "a.csv")
+        demos.save(tmp_path / "a.csv")
     with pytest.raises(UnconstrainError, match="there is no folder"):
-        save(demos, tmp_path / "none" / "a.npz")
+        demos.save(tmp_path / "none" / "a.npz")
     assert list(tmp_path.iterdir()) == []

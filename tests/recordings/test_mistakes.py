@@ -12,7 +12,7 @@ import pytest
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.recordings import load, save
+from unconstrain.recordings import load
 
 XU = {"state": "x", "action": "u"}
 XT = {"state": "x", "time": "t"}
@@ -35,7 +35,7 @@ MOVING = "t,x\n" + "".join(f"{i / 50},{i}\n" for i in range(20))
         ("x,u\n1,2\n", XU | {"state": True}, r"state takes column names or positions .* got True"),
         ("x,u\n1,2\n", XU | {"state": 1.5}, r"state takes column names or positions .* got 1.5"),
         ("x,u\n1,2\n", XU | {"state": []}, r"no state columns were given"),
-        ("x,u\n1,2\n", {}, r"so say state=; its columns are 0 'x', 1 'u'"),
+        ("x,u\n1,2\n", {}, r"give state=, .* its columns are 0 'x', 1 'u'"),
         ("x,u\n1,2\n", {"action": "u"}, r"give state= too"),
         ("x,u\n1,2\n", {"state": "x"}, r"give action=, or time="),
         ("x,u\n1,2\n\n# here\n3,oops\n", XU, r"column 'u' holds 'oops' at line 5 where a number is needed"),
@@ -67,7 +67,7 @@ MOVING = "t,x\n" + "".join(f"{i / 50},{i}\n" for i in range(20))
         ),
         (MOVING, XT | {"window": 0}, r"window must be a positive number, got 0"),
         (MOVING, XT | {"max_speed": "fast"}, r"max_speed must be a positive number, got 'fast'"),
-        (MOVING, XT | {"max_speed": 1e-9}, r"no fragment lasts 0.2 s; raise gap or max_speed"),
+        (MOVING, XT | {"max_speed": 1e-9}, r"no fragment lasts 0.2 s; raise gap= or max_speed="),
         (MOVING, {"state": "x", "action": "t", "max_speed": 1}, r"max_speed needs to know the time"),
         (MOVING, XT | {"min_speed": 1e9}, r"no sample is as fast as min_speed=1e\+09"),
         ("t,x\n" + "".join(f"{i / 50},3.3\n" for i in range(20)), XT, r"are zero: the states do not move"),
@@ -92,10 +92,11 @@ def test_paths(tmp_path):
         (tmp_path / "folder.csv", r"is a folder without Parquet files: give its files, or a pattern"),
         (tmp_path / "b.xlsx", r"suffix '.xlsx'; those known are .csv, .tsv, .txt, .npz, .parquet"),
         (str(tmp_path / "*.tsv"), r"no file matches"),
-        ([], r"no files were given"),
+        ([], r"nothing was given to open"),
         ([path, path], r"a.csv is given twice"),
-        (None, r"paths must be a path or several"),
-        ([1], r"paths must be a path or several"),
+        (None, r"source must be a path or several"),
+        ([1], r"the source is not a path"),
+        ([path, 1], r"paths must be a path or several"),
     ]:
         with pytest.raises(DataError, match=sentence):
             load(paths, **XU)
@@ -175,7 +176,7 @@ def test_one_role_one_column(tmp_path):
 def test_saved_files_that_are_damaged_or_too_new(tmp_path):
     demos = Demonstrations(np.ones((3, 2)), np.ones((3, 2)))
     path = tmp_path / "a.npz"
-    save(demos, path)
+    demos.save(path)
     good = dict(np.load(path))
     about = json.loads(str(good["unconstrain"]))
     for changes, sentence in [
@@ -193,7 +194,7 @@ def test_saved_files_that_are_damaged_or_too_new(tmp_path):
 def test_a_changed_byte_of_a_saved_file_is_noticed(tmp_path, suffix):
     states = np.random.default_rng(0).normal(size=(200, 3))
     path = tmp_path / f"a{suffix}"
-    save(Demonstrations(states, states), path)
+    Demonstrations(states, states).save(path)
     good = path.read_bytes()
     for place in range(50, len(good), 499):
         path.write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])

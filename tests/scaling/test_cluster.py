@@ -34,7 +34,9 @@ def client(cluster):
 def test_a_cluster_gives_the_fit_of_all_at_once(tmp_path, client, which):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [100, 101, 333], row_group_size=40)
     whole = policies()[which].fit(X, U, groups=EPISODES)
-    policy = distributed.fit(policies()[which], folder, client, **COLUMNS, part_rows=70, batch_rows=30)
+    policy = distributed.fit(
+        policies()[which], uc.open(folder, **COLUMNS), client, part_rows=70, batch_rows=30
+    )
     assert_same_fit(policy, whole)
     assert policy.resume().folds.fold_of == whole.resume().folds.fold_of
 
@@ -47,8 +49,8 @@ def test_parts_of_whole_episodes_are_differentiated(tmp_path, client, part_rows)
         time[own[len(own) // 2 :]] += 5.0
     folder = written.write(tmp_path / "parts", X, U, EPISODES, time, [100, 101, 333], lists=True)
     columns = ROLES | {"action": "differentiate", "time": "timestamp"}
-    whole = fit_stream(policies()[2], folder, **columns)
-    policy = distributed.fit(policies()[2], folder, client, **columns, part_rows=part_rows)
+    whole = fit_stream(policies()[2], uc.open(folder, **columns))
+    policy = distributed.fit(policies()[2], uc.open(folder, **columns), client, part_rows=part_rows)
     assert_same_fit(policy, whole)
     assert policy.resume().folds.n_dealt == whole.resume().folds.n_dealt
 
@@ -57,8 +59,10 @@ def test_episodes_known_by_their_files(tmp_path, client):
     columns = {name: COLUMNS[name] for name in ("state", "action")}
     for cuts in ([], [100, 250, 400]):
         folder = written.write(tmp_path / str(len(cuts)), X, U, EPISODES, TIME, cuts, row_group_size=64)
-        whole = fit_stream(uc.ParametricPolicy(alpha="cv"), folder, **columns)
-        policy = distributed.fit(uc.ParametricPolicy(alpha="cv"), folder, client, **columns, part_rows=100)
+        whole = fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns))
+        policy = distributed.fit(
+            uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns), client, part_rows=100
+        )
         assert_same_fit(policy, whole)
 
 
@@ -70,9 +74,9 @@ def test_what_is_known_of_constraints_goes_along(tmp_path, client, way, derived,
         tmp_path / "parts", X, U, EPISODES, TIME, [100, 101, 333], more=known.TOUCHED, row_group_size=40
     )
     columns = COLUMNS | ({"action": None, "time": "timestamp"} if derived else {}) | known.WAYS[way]
-    whole = fit_stream(known.policies()[1], folder, **columns, batch_rows=10_000)
+    whole = fit_stream(known.policies()[1], uc.open(folder, **columns), batch_rows=10_000)
     policy = distributed.fit(
-        known.policies()[1], folder, client, **columns, part_rows=part_rows, batch_rows=30
+        known.policies()[1], uc.open(folder, **columns), client, part_rows=part_rows, batch_rows=30
     )
     known.assert_same_known(policy, whole)
     assert policy.resume().folds.n_dealt == whole.resume().folds.n_dealt
@@ -86,8 +90,10 @@ def test_forces_of_a_file_stay_together_where_files_are_episodes(tmp_path, clien
     folder = written.write(
         tmp_path / "parts", X, U, EPISODES, TIME, cuts, more=known.TOUCHED, row_group_size=64
     )
-    whole = fit_stream(uc.ParametricPolicy(alpha="cv"), folder, **columns)
-    policy = distributed.fit(uc.ParametricPolicy(alpha="cv"), folder, client, **columns, part_rows=100)
+    whole = fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns))
+    policy = distributed.fit(
+        uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns), client, part_rows=100
+    )
     known.assert_same_known(policy, whole)
     assert policy.resume().folds.n_dealt == (len(cuts) + 1 if cuts else 5)
 
@@ -97,7 +103,9 @@ def test_what_counts_as_motion_does_not_depend_on_the_parts(tmp_path, client):
     actions[:200] = np.where(np.arange(200)[:, None] % 2, 1e-9, 1e-17)
     actions[400] = 3e3
     folder = written.write(tmp_path / "parts", X, actions, EPISODES, TIME, [200])
-    policy = distributed.fit(uc.ParametricPolicy(alpha=1e-3), folder, client, **COLUMNS, part_rows=50)
+    policy = distributed.fit(
+        uc.ParametricPolicy(alpha=1e-3), uc.open(folder, **COLUMNS), client, part_rows=50
+    )
     assert_same_fit(policy, uc.ParametricPolicy(alpha=1e-3).fit(X, actions))
 
 
@@ -105,7 +113,7 @@ def test_goes_on_where_a_fit_ended(tmp_path, client):
     today = written.write(tmp_path / "today", X[300:], U[300:], EPISODES[300:], TIME[300:], [100])
     whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=EPISODES)
     policy = uc.ParametricPolicy(alpha="cv").fit(X[:300], U[:300], groups=EPISODES[:300])
-    distributed.fit(policy, today, client, **COLUMNS, part_rows=50, partial=True)
+    distributed.fit(policy, uc.open(today, **COLUMNS), client, part_rows=50, partial=True)
     assert_same_fit(policy, whole)
 
 
@@ -122,7 +130,7 @@ def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path, cluster, client
             os.kill(victim, signal.SIGKILL)
 
     policy = uc.ParametricPolicy(features, alpha="cv")
-    distributed.fit(policy, folder, client, **COLUMNS, part_rows=20, progress=kill)
+    distributed.fit(policy, uc.open(folder, **COLUMNS), client, part_rows=20, progress=kill)
     assert len(told) > 20  # most parts were still to come
     assert told[-1] == len(X)
     assert_same_fit(policy, whole)
@@ -140,7 +148,7 @@ def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path, cluster, client
 def test_broken_parts_are_named(tmp_path, client, how, sentence):
     policy = uc.ParametricPolicy(alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
-        distributed.fit(policy, spoilt(tmp_path / "parts", how), client, **COLUMNS, part_rows=50)
+        distributed.fit(policy, uc.open(spoilt(tmp_path / "parts", how), **COLUMNS), client, part_rows=50)
     assert "\n" not in str(caught.value)
     assert not hasattr(policy, "solution_")
 
@@ -153,13 +161,13 @@ def test_mistakes_about_constraints_are_told_in_one_sentence(tmp_path, client):
         (
             "inconsistency",
             known.FORCE,
-            "after another began; to filter the forces of the data, sort them by episode",
+            "after others were read; to filter the forces of the data, sort them by episode",
         ),
         ("direct", known.WAYS["lists"], "projections are for risk"),
     ):
         policy = uc.ParametricPolicy(risk=risk, alpha=1e-6)
         with pytest.raises(uc.errors.UnconstrainError, match=sentence):
-            distributed.fit(policy, folder, client, **COLUMNS, **options, part_rows=50)
+            distributed.fit(policy, uc.open(folder, **COLUMNS, **options), client, part_rows=50)
         assert not hasattr(policy, "solution_")
 
 

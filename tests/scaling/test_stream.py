@@ -1,3 +1,4 @@
+import os
 import signal
 import subprocess
 import sys
@@ -63,7 +64,7 @@ def test_however_the_rows_lie_in_files_the_fit_is_that_of_all_at_once(
     )
     whole = policies()[which].fit(X, U, groups=EPISODES)
     streamed = stream.fit_stream(
-        policies()[which], folder, **(ROLES if lists else COLUMNS), batch_rows=batch_rows
+        policies()[which], uc.open(folder, **ROLES if lists else COLUMNS), batch_rows=batch_rows
     )
     assert_same_fit(streamed, whole)
 
@@ -97,7 +98,7 @@ def test_derivatives_do_not_notice_where_files_end(tmp_path, cuts):
     demos = uc.load(tmp_path / "one" / "part-0.parquet", **columns)
     for whole, policy in zip(policies(), policies(), strict=True):
         whole.fit(demos.states, demos.actions, groups=demos.episodes)
-        stream.fit_stream(policy, folder, **columns, batch_rows=70)
+        stream.fit_stream(policy, uc.open(folder, **columns), batch_rows=70)
         assert_same_fit(policy, whole)
 
 
@@ -115,7 +116,7 @@ def test_gaps_make_episodes_as_loading_does(tmp_path):
     assert demos.n_episodes > len(np.unique(EPISODES))
     whole = uc.ParametricPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
     assert_same_fit(
-        stream.fit_stream(uc.ParametricPolicy(alpha="cv"), folder, **columns, batch_rows=50), whole
+        stream.fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns), batch_rows=50), whole
     )
 
 
@@ -128,11 +129,13 @@ def test_episodes_too_broken_to_differentiate_are_left_out(tmp_path):
     demos = uc.load(tmp_path / "one" / "part-0.parquet", **columns)
     whole = uc.ParametricPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
     assert len(demos) == len(X) - len(own)
-    policy = stream.fit_stream(uc.ParametricPolicy(alpha="cv"), tmp_path / "one", **columns, batch_rows=1)
+    policy = stream.fit_stream(
+        uc.ParametricPolicy(alpha="cv"), uc.open(tmp_path / "one", **columns), batch_rows=1
+    )
     assert_same_fit(policy, whole)
     written.write(tmp_path / "none", X[own], U[own], EPISODES[own], time[own], [])
     with pytest.raises(uc.errors.DataError, match="no episode has a fragment long enough"):
-        stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), tmp_path / "none", **columns)
+        stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(tmp_path / "none", **columns))
 
 
 def test_small_data_are_placed_as_fit_places_them(tmp_path):
@@ -141,22 +144,25 @@ def test_small_data_are_placed_as_fit_places_them(tmp_path):
         lambda: uc.LocallyLinearPolicy(n_centers=6, alpha=1e-6),
         lambda: uc.ParametricPolicy(uc.NormalizedRBF(5), alpha=1e-6),
     ):
-        assert_same_fit(stream.fit_stream(make(), folder, **COLUMNS), make().fit(X, U))
+        assert_same_fit(stream.fit_stream(make(), uc.open(folder, **COLUMNS)), make().fit(X, U))
 
 
 def test_centres_lie_on_a_bounded_random_sample(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200, 400], row_group_size=40)
     policy = uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6)
-    stream.fit_stream(policy, folder, **COLUMNS, sample_rows=50)
+    stream.fit_stream(policy, uc.open(folder, **COLUMNS), sample_rows=50)
     rows = {tuple(x) for x in X}
     assert len(policy.centers_) == 8
     assert all(tuple(center) in rows for center in policy.centers_)
     again = stream.fit_stream(
-        uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6), folder, **COLUMNS, sample_rows=50
+        uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6), uc.open(folder, **COLUMNS), sample_rows=50
     )
     np.testing.assert_array_equal(again.centers_, policy.centers_)
     other = stream.fit_stream(
-        uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6), folder, **COLUMNS, sample_rows=50, random_state=1
+        uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6),
+        uc.open(folder, **COLUMNS),
+        sample_rows=50,
+        random_state=1,
     )
     assert not np.array_equal(other.centers_, policy.centers_)
     given = uc.LocallyLinearPolicy(centers=policy.centers_, width=policy.width_, alpha=1e-6).fit(X, U)
@@ -171,16 +177,18 @@ def test_without_episode_column_files_are_episodes_and_one_file_is_cut_into_bloc
     several = written.write(tmp_path / "several", X, U, EPISODES, TIME, [100, 250, 400])
     groups = np.repeat([0, 1, 2, 3], np.diff([0, 100, 250, 400, len(X)]))
     whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=groups)
-    assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha="cv"), several, **columns), whole)
+    assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(several, **columns)), whole)
     one = written.write(tmp_path / "one", X, U, EPISODES, TIME, [])
     whole = uc.ParametricPolicy(alpha="cv").fit(X, U)
-    assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha="cv"), one, **columns, batch_rows=64), whole)
+    assert_same_fit(
+        stream.fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(one, **columns), batch_rows=64), whole
+    )
 
 
 def test_what_uc_save_wrote_needs_no_columns(tmp_path):
     demos = uc.Demonstrations(X, U, EPISODES)
     for i, part in enumerate((slice(0, 300), slice(300, None))):
-        uc.save(demos.select(part), tmp_path / f"{i}.parquet")
+        demos.select(part).save(tmp_path / f"{i}.parquet")
     loaded = uc.load([tmp_path / "0.parquet", tmp_path / "1.parquet"])
     whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=loaded.episodes)
     assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha="cv"), tmp_path), whole)
@@ -188,7 +196,7 @@ def test_what_uc_save_wrote_needs_no_columns(tmp_path):
 
 def test_file_uris_open_as_object_stores_do(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200])
-    streamed = stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder.as_uri(), **COLUMNS)
+    streamed = stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder.as_uri(), **COLUMNS))
     assert_same_fit(streamed, uc.ParametricPolicy(alpha=1e-6).fit(X, U))
 
 
@@ -207,12 +215,14 @@ def test_single_precision_is_that_of_the_files_and_of_nothing_else(tmp_path, sca
         lambda: uc.ParametricPolicy(uc.DecoupledFeatures(), risk="direct", alpha="cv"),
     ):
         whole = make().fit(states.astype(float), actions.astype(float), groups=EPISODES)
-        assert_same_fit(stream.fit_stream(make(), tmp_path, **COLUMNS, batch_rows=100), whole, states)
+        assert_same_fit(
+            stream.fit_stream(make(), uc.open(tmp_path, **COLUMNS), batch_rows=100), whole, states
+        )
 
 
 def test_columns_not_needed_are_not_read(tmp_path, columns_read):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
-    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, state=["x0"], action=["u1"])
+    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, state=["x0"], action=["u1"]))
     assert columns_read[-1] == ["x0", "u1"]  # the first call looks at one row, to see what columns there are
 
 
@@ -243,15 +253,14 @@ def test_progress_tells_rows_done_and_in_all(tmp_path, capsys):
     told = []
     stream.fit_stream(
         uc.ParametricPolicy(alpha=1e-6),
-        folder,
-        **COLUMNS,
+        uc.open(folder, **COLUMNS),
         progress=lambda *rows: told.append(rows),
         batch_rows=100,
     )
     assert told[0] == (0, len(X))
     assert told[-1] == (len(X), len(X))
     assert all(a[0] < b[0] for a, b in pairwise(told))
-    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, progress=True)
+    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS), progress=True)
     assert f"{len(X):,} of {len(X):,} rows" in capsys.readouterr().err
 
 
@@ -270,7 +279,7 @@ def test_a_checkpoint_that_cannot_be_written_is_refused_before_the_work(tmp_path
 
 def test_ctrl_c_keeps_what_was_done_and_says_how_to_go_on(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [100, 333])
-    whole = stream.fit_stream(policies()[2], folder, **COLUMNS, batch_rows=64)
+    whole = stream.fit_stream(policies()[2], uc.open(folder, **COLUMNS), batch_rows=64)
 
     def stop(done, total):
         if done >= 200:
@@ -278,17 +287,16 @@ def test_ctrl_c_keeps_what_was_done_and_says_how_to_go_on(tmp_path):
 
     policy, file = policies()[2], tmp_path / "run.ckpt.npz"
     with pytest.raises(KeyboardInterrupt, match="nothing was learnt; give a checkpoint"):
-        stream.fit_stream(policy, folder, **COLUMNS, batch_rows=64, progress=stop)
+        stream.fit_stream(policy, uc.open(folder, **COLUMNS), batch_rows=64, progress=stop)
     assert not hasattr(policy, "moments_")
     with pytest.raises(
         KeyboardInterrupt, match=r"after 228 of .* rows: the same call with checkpoint .* goes on"
     ):
-        stream.fit_stream(policy, folder, **COLUMNS, batch_rows=64, progress=stop, checkpoint=file)
+        stream.fit_stream(policy, uc.open(folder, **COLUMNS), batch_rows=64, progress=stop, checkpoint=file)
     told = []
     stream.fit_stream(
         policy,
-        folder,
-        **COLUMNS,
+        uc.open(folder, **COLUMNS),
         batch_rows=64,
         checkpoint=file,
         progress=lambda done, total: told.append(done),
@@ -315,7 +323,7 @@ def test_a_killed_process_goes_on_where_it_stopped(tmp_path, derived):
             if done >= 300:
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        stream.fit_stream({make}, {str(folder)!r}, **{columns!r}, batch_rows=50, sample_rows=200,
+        stream.fit_stream({make}, uc.open({str(folder)!r}, **{columns!r}), batch_rows=50, sample_rows=200,
                           checkpoint={str(tmp_path / "run.npz")!r}, checkpoint_seconds=0, progress=stop)
     """
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, timeout=60)
@@ -324,38 +332,56 @@ def test_a_killed_process_goes_on_where_it_stopped(tmp_path, derived):
     told = []
     policy = stream.fit_stream(
         eval(make),
-        folder,
-        **columns,
+        uc.open(folder, **columns),
         **options,
         checkpoint=tmp_path / "run.npz",
         progress=lambda rows, total: told.append(rows),
     )
     assert told[0] >= 250
-    whole = stream.fit_stream(eval(make), folder, **columns, **options)
+    whole = stream.fit_stream(eval(make), uc.open(folder, **columns), **options)
     np.testing.assert_array_equal(policy.centers_, whole.centers_)
     np.testing.assert_allclose(policy.predict(X), whole.predict(X), rtol=1e-12, atol=1e-12)
     assert policy.resume().folds.fold_of == whole.resume().folds.fold_of
-    again = stream.fit_stream(eval(make), folder, **columns, **options, checkpoint=tmp_path / "run.npz")
+    again = stream.fit_stream(
+        eval(make), uc.open(folder, **columns), **options, checkpoint=tmp_path / "run.npz"
+    )
     np.testing.assert_array_equal(again.predict(X), policy.predict(X))
+
+
+def changed_in_place(folder):
+    """Other data of the same name, size and time of change."""
+    (path,) = folder.iterdir()
+    about = path.stat()
+    written.write(folder, X, U[:, ::-1], EPISODES, TIME, [])
+    os.utime(path, ns=(about.st_atime_ns, about.st_mtime_ns))
+    assert path.stat().st_size == about.st_size
+    return uc.open(folder, **COLUMNS)
 
 
 @pytest.mark.parametrize(
     ("other", "what"),
     [
-        (lambda f, o: (uc.ParametricPolicy(alpha=1.0), f, COLUMNS), "policy"),
-        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), o, COLUMNS), "source"),
-        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), f, COLUMNS | {"state": ["x0"]}), "source"),
-        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), f, COLUMNS | {"batch_rows": 10}), "settings"),
+        (lambda f, o: (uc.ParametricPolicy(alpha=1.0), uc.open(f, **COLUMNS), {}), "policy"),
+        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), uc.open(o, **COLUMNS), {}), "source"),
+        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), changed_in_place(f), {}), "source"),
+        (
+            lambda f, o: (uc.ParametricPolicy(alpha=1e-6), uc.open(f, **COLUMNS | {"state": ["x0"]}), {}),
+            "source",
+        ),
+        (
+            lambda f, o: (uc.ParametricPolicy(alpha=1e-6), uc.open(f, **COLUMNS), {"batch_rows": 10}),
+            "settings",
+        ),
     ],
 )
 def test_a_checkpoint_of_something_else_is_refused(tmp_path, other, what):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
     another = written.write(tmp_path / "another", X[:90], U[:90], EPISODES[:90], TIME[:90], [])
     file = tmp_path / "run.npz"
-    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, checkpoint=file)
-    policy, source, columns = other(folder, another)
+    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS), checkpoint=file)
+    policy, recordings, settings = other(folder, another)
     with pytest.raises(uc.errors.UnconstrainError, match=f"checkpoint of another {what}"):
-        stream.fit_stream(policy, source, **columns, checkpoint=file)
+        stream.fit_stream(policy, recordings, **settings, checkpoint=file)
 
 
 def test_a_checkpoint_that_is_none_is_refused(tmp_path):
@@ -367,7 +393,7 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path):
         (tmp_path / "run.npz").write_bytes(content)
         with pytest.raises(uc.errors.UnconstrainError, match=sentence):
             stream.fit_stream(
-                uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, checkpoint=tmp_path / "run.npz"
+                uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS), checkpoint=tmp_path / "run.npz"
             )
 
 
@@ -414,7 +440,7 @@ def spoilt(folder, how):
 def test_broken_files_are_named(tmp_path, how, sentence):
     policy = uc.ParametricPolicy(alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
-        stream.fit_stream(policy, spoilt(tmp_path / "parts", how), **COLUMNS)
+        stream.fit_stream(policy, uc.open(spoilt(tmp_path / "parts", how), **COLUMNS))
     assert "\n" not in str(caught.value)
     assert not hasattr(policy, "moments_")
 
@@ -422,16 +448,29 @@ def test_broken_files_are_named(tmp_path, how, sentence):
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda f, p: stream.fit_stream(p, f / "nowhere", **COLUMNS), "there is no file or folder"),
-        (lambda f, p: stream.fit_stream(p, f.parent / "empty", **COLUMNS), "there are no Parquet files in"),
+        (lambda f, p: stream.fit_stream(p, uc.open(f / "nowhere", **COLUMNS)), "there is no file or folder"),
+        (
+            lambda f, p: stream.fit_stream(p, uc.open(f.parent / "empty", **COLUMNS)),
+            "is a folder without Parquet files",
+        ),
         (lambda f, p: stream.fit_stream(p, f), r"give state=, .* its columns are 0 'x0', 1 'x1'"),
-        (lambda f, p: stream.fit_stream(p, f, state=["x7"], action="u0"), "no column 'x7' for state"),
-        (lambda f, p: stream.fit_stream(p, f, state="x0"), "give action=, or time="),
-        (lambda f, p: stream.fit_stream(p, f, **COLUMNS, batch_rows=0), "batch_rows must be"),
-        (lambda f, p: stream.fit_stream(p, "bogus://x/y", **COLUMNS), "bogus://x/y cannot be opened"),
-        (lambda f, p: stream.fit_stream(p, [(X, U)], state="x0"), "state= chooses a column of files"),
-        (lambda f, p: stream.fit_stream(p, []), "the source has no samples"),
-        (lambda f, p: stream.fit_stream(p, 3), "source must be a Parquet file or folder"),
+        (
+            lambda f, p: stream.fit_stream(p, uc.open(f, state=["x7"], action="u0")),
+            "no column 'x7' for state",
+        ),
+        (lambda f, p: stream.fit_stream(p, uc.open(f, state="x0")), "give action=, or time="),
+        (lambda f, p: stream.fit_stream(p, uc.open(f, **COLUMNS), batch_rows=0), "batch_rows must be"),
+        (
+            lambda f, p: stream.fit_stream(p, uc.open("bogus://x/y", **COLUMNS)),
+            "bogus://x/y cannot be opened",
+        ),
+        (
+            lambda f, p: stream.fit_stream(p, uc.open([(X, U)], state="x0")),
+            "state= chooses a column of files",
+        ),
+        (lambda f, p: stream.fit_stream(p, []), "nothing was given to open"),
+        (lambda f, p: stream.fit_stream(p, iter([])), "the source has no samples"),
+        (lambda f, p: stream.fit_stream(p, 3), "source must be a path or several"),
         (lambda f, p: stream.fit_stream(p, [X]), r"batch 0 \(counted from 0\) must be \(X, U\)"),
         (lambda f, p: stream.fit_stream(p, [(X, U[:3])]), "must hold X"),
         (lambda f, p: stream.fit_stream(p, [(X, U), (X, U[:, :1])]), "batch 1 .* has 3 state and 1 action"),
@@ -458,7 +497,6 @@ def test_an_episode_that_comes_back_cannot_be_differentiated(tmp_path):
     with pytest.raises(uc.errors.DataError, match=r"goes on at row .* sort it by episode"):
         stream.fit_stream(
             uc.ParametricPolicy(alpha=1e-6),
-            folder,
-            **COLUMNS | {"action": None, "time": "timestamp"},
+            uc.open(folder, **COLUMNS | {"action": None, "time": "timestamp"}),
             batch_rows=50,
         )

@@ -82,7 +82,7 @@ def test_however_the_rows_lie_in_files_the_fit_is_that_of_all_at_once(
         return  # one episode only: there is nothing to hold out
     whole, demos = in_memory(policies()[which], files, columns, way)
     streamed = uc.fit_stream(
-        policies()[which], folder / "parts", **columns, **WAYS[way], batch_rows=batch_rows
+        policies()[which], uc.open(folder / "parts", **columns, **WAYS[way]), batch_rows=batch_rows
     )
     assert_same_known(streamed, whole, demos.states)
 
@@ -113,7 +113,7 @@ def test_what_uc_save_wrote_is_used_by_the_names_of_its_columns(tmp_path):
     demos = uc.Demonstrations(X, U, EPISODES, forces=forces, free=TOUCHED["free"], projections=N)
     half = len(X) // 2  # in the middle of an episode, which ends up as two
     for i, part in enumerate((slice(0, half), slice(half, None))):
-        uc.save(demos.select(part), tmp_path / f"{i}.parquet")
+        demos.select(part).save(tmp_path / f"{i}.parquet")
     loaded = uc.load([tmp_path / "0.parquet", tmp_path / "1.parquet"])
     np.testing.assert_array_equal(loaded.projections, N)
     for way, known in (
@@ -124,8 +124,11 @@ def test_what_uc_save_wrote_is_used_by_the_names_of_its_columns(tmp_path):
         ),
     ):
         whole = policies()[0].fit(X, U, groups=loaded.episodes, projections=known)
-        assert_same_known(uc.fit_stream(policies()[0], tmp_path, **way, batch_rows=50), whole)
-    assert uc.fit_stream(policies()[0], tmp_path).n_known_constraints_ == 0  # used where asked for
+        assert_same_known(uc.fit_stream(policies()[0], uc.open(tmp_path, **way), batch_rows=50), whole)
+    whole = policies()[0].fit(loaded)  # what files know of projections counts as it does in memory
+    assert_same_known(uc.fit_stream(policies()[0], tmp_path), whole)
+    direct = uc.fit_stream(policies()[0].set_params(risk="direct"), tmp_path)
+    assert_same_fit(direct, uc.ParametricPolicy(risk="direct", alpha="cv").fit(loaded))
 
 
 def test_fragments_left_out_take_what_was_known_with_them(tmp_path):
@@ -136,9 +139,11 @@ def test_fragments_left_out_take_what_was_known_with_them(tmp_path):
     columns = DERIVED | {"episode": "episode_index"}
     whole, demos = in_memory(policies()[0], tmp_path / "one" / "part-0.parquet", columns, "force")
     assert len(demos) == len(X) - len(own)
-    streamed = uc.fit_stream(policies()[0], tmp_path / "one", **columns, **FORCE, batch_rows=1)
+    streamed = uc.fit_stream(policies()[0], uc.open(tmp_path / "one", **columns, **FORCE), batch_rows=1)
     assert_same_known(streamed, whole, demos.states)
-    streamed = uc.fit_stream(policies()[0], tmp_path / "one", **columns, **WAYS["lists"], batch_rows=1)
+    streamed = uc.fit_stream(
+        policies()[0], uc.open(tmp_path / "one", **columns, **WAYS["lists"]), batch_rows=1
+    )
     rest = np.ones(len(X), dtype=bool)
     rest[own] = False
     whole = policies()[0].fit(demos.states, demos.actions, groups=demos.episodes, projections=N[rest])
@@ -166,11 +171,7 @@ def test_columns_not_needed_are_not_read(tmp_path, columns_read):
     one = {"state": ["x0"], "action": ["u1"], "episode": "episode_index"}
     uc.fit_stream(
         uc.LocallyLinearPolicy(n_centers=2, alpha=1e-6),
-        folder,
-        **one,
-        force="f1",
-        force_threshold=1.0,
-        free="free",
+        uc.open(folder, **one, force="f1", force_threshold=1.0, free="free"),
     )
     # A first row to see what there is, a sample to place centres on, and then all.
     assert columns_read[1:] == [["x0", "u1"], ["x0", "u1", "f1", "free", "episode_index"]]
@@ -182,8 +183,8 @@ def test_columns_not_needed_are_not_read(tmp_path, columns_read):
 @pytest.mark.parametrize("way", ["force", "lists"])
 def test_an_interrupted_stream_goes_on(tmp_path, way):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [100, 333], more=TOUCHED)
-    options = COLUMNS | WAYS[way] | {"batch_rows": 64}
-    whole = uc.fit_stream(policies()[1], folder, **options)
+    options = COLUMNS | WAYS[way]
+    whole = uc.fit_stream(policies()[1], uc.open(folder, **options), batch_rows=64)
     told = []
 
     def stop(done, total):
@@ -192,8 +193,14 @@ def test_an_interrupted_stream_goes_on(tmp_path, way):
 
     policy, file = policies()[1], tmp_path / "run.npz"
     with pytest.raises(KeyboardInterrupt, match="goes on from there"):
-        uc.fit_stream(policy, folder, **options, progress=stop, checkpoint=file)
-    uc.fit_stream(policy, folder, **options, checkpoint=file, progress=lambda done, _: told.append(done))
+        uc.fit_stream(policy, uc.open(folder, **options), batch_rows=64, progress=stop, checkpoint=file)
+    uc.fit_stream(
+        policy,
+        uc.open(folder, **options),
+        batch_rows=64,
+        checkpoint=file,
+        progress=lambda done, _: told.append(done),
+    )
     assert told[0] >= 200
     np.testing.assert_array_equal(policy.predict(X), whole.predict(X))
     assert policy.n_known_constraints_ == whole.n_known_constraints_ > 0
@@ -202,11 +209,13 @@ def test_an_interrupted_stream_goes_on(tmp_path, way):
 def test_a_checkpoint_belongs_to_what_was_known(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     file = tmp_path / "run.npz"
-    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **FORCE, checkpoint=file)
+    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **FORCE), checkpoint=file)
     others = [{}, FORCE | {"force_threshold": 2.5}, FORCE | {"force": ["f1", "f0", "f2"]}, WAYS["lists"]]
     for other in [*others, FORCE | {"free": "free"}]:
         with pytest.raises(uc.errors.UnconstrainError, match="checkpoint of another source"):
-            uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **other, checkpoint=file)
+            uc.fit_stream(
+                uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **other), checkpoint=file
+            )
     file = tmp_path / "batches.npz"
     uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U, None, N)], checkpoint=file)
     for batch in ((X, U), (X, U, None, np.full_like(N, np.nan))):
@@ -240,7 +249,7 @@ LONG = pa.array([np.eye(3).ravel()[: 8 if i == 207 else 9] for i in range(len(X)
             r"part-1.parquet: the projection at row \d+ .* neither finite numbers throughout nor NaN throughout",
         ),
         ("N", LONG, "lists", "part-1.parquet: column 'N' holds a list of 8 at row 7 .* 9 numbers are needed"),
-        ("n0", np.full(len(X), "a"), "columns", "part-0.parquet: column 'n0' holds string values"),
+        ("n0", np.full(len(X), "a"), "columns", "part-0.parquet: column 'n0' holds 'a' at row 0"),
         ("N", pa.array([{"a": 1.0}] * len(X)), "lists", "part-0.parquet: column 'N' holds struct"),
         ("N", pa.array([[2.0] * 9] * len(X)), "lists", "part-0.parquet: the projection at row 0 .* is none"),
         ("f1", changed("f1", 207, np.nan), "force", "part-1.parquet: column 'f1' holds nan at row 7"),
@@ -251,7 +260,7 @@ LONG = pa.array([np.eye(3).ravel()[: 8 if i == 207 else 9] for i in range(len(X)
 def test_broken_files_are_named(tmp_path, name, values, way, sentence):
     policy = uc.ParametricPolicy(alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
-        uc.fit_stream(policy, spoilt(tmp_path / "parts", name, values), **COLUMNS, **WAYS[way])
+        uc.fit_stream(policy, uc.open(spoilt(tmp_path / "parts", name, values), **COLUMNS, **WAYS[way]))
     assert "\n" not in str(caught.value)
     assert not hasattr(policy, "moments_")
 
@@ -261,19 +270,19 @@ def test_broken_files_are_named(tmp_path, name, values, way, sentence):
     [
         ("inconsistency", None, FORCE | WAYS["lists"], "projections= and force= both say"),
         ("inconsistency", None, WAYS["free"] | WAYS["lists"], "projections= and free= both say"),
-        ("inconsistency", None, {"force": FORCE["force"]}, "give force_threshold, above which"),
-        ("inconsistency", None, {"force_threshold": 2.0}, "force_threshold is for forces"),
+        ("inconsistency", None, {"force": FORCE["force"]}, "give force_threshold=, above which"),
+        ("inconsistency", None, {"force_threshold": 2.0}, "force_threshold= is for forces"),
         (
             "inconsistency",
             None,
             FORCE | {"force_threshold": 0.0},
-            "force threshold must be a number above zero",
+            "force_threshold must be a positive number",
         ),
         (
             "inconsistency",
             None,
             FORCE | {"force_threshold": "2"},
-            "force threshold must be a number above zero",
+            "force_threshold must be a positive number",
         ),
         ("inconsistency", None, FORCE | {"force": ["f0", "f1"]}, "2 force columns and 3 actions"),
         ("inconsistency", None, FORCE | {"force": ["f0", "f1", "fz"]}, r"no column 'fz' for force"),
@@ -313,7 +322,7 @@ def test_mistakes_are_told_in_one_sentence(tmp_path, risk, source, options, sent
     columns = {} if source is not None else COLUMNS
     source = source or written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
-        uc.fit_stream(policy, source, **columns, **options)
+        uc.fit_stream(policy, uc.open(source, **columns, **options))
     assert "\n" not in str(caught.value)
     assert not hasattr(policy, "moments_")
 
@@ -322,13 +331,11 @@ def test_flags_may_be_booleans_or_say_so(tmp_path):
     free = np.array(TOUCHED["free"]) == 1
     whole = uc.fit_stream(
         uc.ParametricPolicy(alpha=1e-6),
-        spoilt(tmp_path / "ones", "free", free * 1),
-        **COLUMNS,
-        **WAYS["free"],
+        uc.open(spoilt(tmp_path / "ones", "free", free * 1), **COLUMNS, **WAYS["free"]),
     )
     for name, flags in [("booleans", free), ("text", free.astype(str))]:
         folder = spoilt(tmp_path / name, "free", flags)
-        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **WAYS["free"])
+        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS["free"]))
         assert policy.n_known_constraints_ == whole.n_known_constraints_ == np.count_nonzero(free)
         np.testing.assert_array_equal(policy.predict(X), whole.predict(X))
         loaded = uc.load(folder / "part-0.parquet", **COLUMNS, free="free")
@@ -347,7 +354,7 @@ def test_a_file_may_know_no_projection(tmp_path, unknown):
     whole = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U, EPISODES, known)])
     for nothing in (pa.nulls(len(table)), pa.array([[]] * len(table), pa.list_(pa.float64()))):
         pq.write_table(table.set_column(at, "N", nothing), path)
-        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **WAYS["lists"])
+        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS["lists"]))
         assert policy.n_known_constraints_ == whole.n_known_constraints_
         np.testing.assert_allclose(policy.predict(X), whole.predict(X), rtol=1e-9)
 
@@ -359,7 +366,7 @@ def test_an_episode_that_comes_back_has_no_neighbours(tmp_path):
     with pytest.raises(
         uc.errors.DataError, match=r"goes on at row .* to filter the forces of a stream, sort it"
     ):
-        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **FORCE, batch_rows=50)
+        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **FORCE), batch_rows=50)
     # Flags and projections say what they say, wherever their samples are.
     for way in ("free", "lists"):
-        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), folder, **COLUMNS, **WAYS[way], batch_rows=50)
+        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS[way]), batch_rows=50)

@@ -28,7 +28,7 @@ def evaluate(policy: Path, recorded: recordings.Recorded) -> None:
 
     learnt = load_policy(policy)
     with working("reading"):
-        demos = recorded.like(getattr(learnt, "recording_", {})).load()
+        demos = recorded.like(getattr(learnt, "recording_", None)).load()
     recordings.describe(demos)
     if demos.states.shape[1] != learnt.n_features_in_ or demos.actions.shape[1] != learnt.n_actions_:
         raise DataError(

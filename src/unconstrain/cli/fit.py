@@ -179,12 +179,13 @@ def _fit_stream(
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
 
-    policy, how = model.build(), recorded.arguments()
-    source = recorded.files[0] if len(recorded.files) == 1 else recorded.files
+    policy, opened = model.build(), recorded.open()
     if cluster is None:
-        fit_stream(policy, source, **how, checkpoint=checkpoint, progress=True)
+        fit_stream(policy, opened, checkpoint=checkpoint, progress=True)
     else:
         with distributed.connected(cluster) as client:
-            distributed.fit(policy, source, client, **how, progress=True)
+            distributed.fit(policy, opened, client, progress=True)
+    for note in opened.notes:
+        reporting.say(f"note: {note}")
     policy.recording_ = recorded.kept()
     return policy

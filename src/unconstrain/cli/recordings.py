@@ -1,9 +1,8 @@
 """Which recordings a command reads, and how: options that all commands share."""
 
-import dataclasses
 import os
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -15,6 +14,9 @@ from unconstrain.recordings.preparation import Preparation
 
 if TYPE_CHECKING:
     from unconstrain.demonstrations import Demonstrations
+    from unconstrain.recordings import Recordings
+
+Carrier = TypeVar("Carrier", Columns, Preparation)
 
 FOLDS = ("episodes", "blocks")
 
@@ -49,45 +51,40 @@ class Recorded:
         columns = self.columns
         return any(told is not None for told in (columns.force, columns.free, columns.projections))
 
+    def open(self) -> "Recordings":
+        """Open all of it; projections are those that the columns tell of, not those that only simulation knows."""
+        from unconstrain.recordings import open as open_recordings
+
+        opened = open_recordings(self.files, columns=self.columns, preparation=self.preparation)
+        return opened if self.tells_constraints else opened.without_projections()
+
     def load(self) -> "Demonstrations":
-        """Read all of it; projections are those that the columns tell of, not those that only simulation knows."""
-        from unconstrain.constraints import from_recording
-        from unconstrain.recordings import load
+        """Read all of it into memory."""
+        return self.open().load()
 
-        how = vars(self.columns) | vars(self.preparation)
-        del how["projections"]
-        threshold = how.pop("force_threshold")
-        demos = load(self.files, **how)
-        known = from_recording(demos, force_threshold=threshold) if self.tells_constraints else None
-        return dataclasses.replace(demos, projections=known)
-
-    def kept(self) -> dict[str, Any]:
+    def kept(self) -> tuple[Columns, Preparation]:
         """Return how to read other recordings like these, to be saved with a policy."""
-        how = vars(self.columns) | vars(self.preparation)
-        told = ("force", "free", "projections", "force_threshold")
-        return {name: value for name, value in how.items() if value is not None and name not in told}
+        return (
+            replace(self.columns, force=None, free=None, projections=None),
+            replace(self.preparation, force_threshold=None),
+        )
 
-    def arguments(self) -> dict[str, Any]:
-        """Return what `fit_stream` takes besides the files."""
-        how = vars(self.columns) | vars(self.preparation)
-        if how.pop("min_speed") is not None:
-            raise DataError("min_speed= needs all data in memory, and a stream is read once: leave it out")
-        return how
-
-    def like(self, kept: dict[str, Any]) -> "Recorded":
+    def like(self, kept: tuple[Columns, Preparation] | None) -> "Recorded":
         """Return the same files, read as others were, except where the command line says otherwise.
 
         If the command line names the states, it speaks of another layout, and no column is taken over.
         """
-        layout = _names(Columns) if "state" in self.given else frozenset()
-        taken = {name: value for name, value in kept.items() if name not in self.given | layout}
+        columns, preparation = kept or (Columns(), Preparation())
         return replace(
             self,
-            columns=replace(self.columns, **{n: v for n, v in taken.items() if n in _names(Columns)}),
-            preparation=replace(
-                self.preparation, **{n: v for n, v in taken.items() if n in _names(Preparation)}
-            ),
+            columns=self.columns if "state" in self.given else self._filled(self.columns, columns),
+            preparation=self._filled(self.preparation, preparation),
         )
+
+    def _filled(self, own: Carrier, other: Carrier) -> Carrier:
+        """Return options with those of another where the command line does not give them."""
+        taken = {name: getattr(other, name) for name in _names(type(own)) - self.given}
+        return replace(own, **taken)
 
 
 def _recorded(files: tuple[str, ...], **values: Any) -> Recorded:

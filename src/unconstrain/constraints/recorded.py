@@ -18,28 +18,89 @@ def from_recording(
     margin: int = 0,
     jacobian: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
-    """Projections (N, d, d) of a recording that holds forces, free flags, or both; NaN where nothing is known.
+    """Return the projections of a recording that holds forces, free flags, or both.
 
     A sample flagged "free" has the identity. One that is not flagged, though there are flags, has what its force says,
     unless that is "free" too: then the two disagree, and nothing is known.
 
-    demonstrations: with `forces` (N, m), `free` (N,), or both, as `load(..., force=[...], free=...)` reads them.
-    force_threshold: needed where there are forces, in their unit; it and all others as for `from_forces`.
+    Parameters
+    ----------
+    demonstrations : Demonstrations
+        With `forces` (N, m), `free` (N,), or both, as ``load(..., force=[...], free=...)`` reads them.
+    force_threshold : float, optional
+        Needed where there are forces, in their unit; see `from_forces`.
+    release, window, margin, jacobian
+        See `from_forces`.
 
-    Raises `DataError` where there are neither forces nor flags, or forces without a threshold.
+    Returns
+    -------
+    array (N, d, d)
+        NaN where nothing is known.
+
+    Raises
+    ------
+    DataError
+        There are neither forces nor flags, or forces without a threshold.
     """
-    forces, free = demonstrations.forces, demonstrations.free
-    if forces is None and free is None:
+    if demonstrations.forces is None and demonstrations.free is None:
         raise DataError(
-            "these demonstrations have neither forces nor flags that say free: name the columns when loading, "
-            "load(..., force=[...]) or load(..., free=...)"
+            "these demonstrations have neither forces nor flags that say free: name the columns when loading, with "
+            "force= or free="
         )
-    d = demonstrations.actions.shape[1]
+    return from_forces_and_flags(
+        demonstrations.forces,
+        demonstrations.free,
+        demonstrations.actions,
+        demonstrations.episodes,
+        force_threshold=force_threshold,
+        release=release,
+        window=window,
+        margin=margin,
+        jacobian=jacobian,
+    )
+
+
+def from_forces_and_flags(
+    forces: NDArray[np.float64] | None,
+    free: NDArray[np.float64] | None,
+    actions: NDArray[np.float64],
+    episodes: NDArray[np.int64],
+    *,
+    force_threshold: float | None = None,
+    release: float | None = None,
+    window: int = 5,
+    margin: int = 0,
+    jacobian: ArrayLike | None = None,
+) -> NDArray[np.float64]:
+    """Return projections of what `from_recording` takes from demonstrations.
+
+    Parameters
+    ----------
+    forces : array (N, m) or None
+    free : array (N,) or None
+        Not None where there are no forces.
+    actions : array (N, d)
+    episodes : array (N,)
+        Forces are filtered within each.
+    force_threshold, release, window, margin, jacobian
+        See `from_forces`.
+
+    Returns
+    -------
+    array (N, d, d)
+        NaN where nothing is known.
+
+    Raises
+    ------
+    DataError
+        There are forces without a threshold, or forces that do not fit the actions.
+    """
+    d = actions.shape[1]
     if forces is None:
         assert free is not None
         return from_flags(free, d)
     if force_threshold is None:
-        raise DataError("give force_threshold, above which a force is a contact, in the unit of the forces")
+        raise DataError("give force_threshold=, above which a force is a contact, in the unit of the forces")
     if jacobian is None and forces.shape[1] != d:
         raise DataError(
             f"forces have {forces.shape[1]} components and actions {d} dimensions: give one force column for each "
@@ -48,12 +109,12 @@ def from_recording(
     felt = from_forces(
         forces,
         force_threshold,
-        actions=demonstrations.actions,
+        actions=actions,
         jacobian=jacobian,
         release=release,
         window=window,
         margin=margin,
-        episodes=demonstrations.episodes,
+        episodes=episodes,
     )
     if free is None:
         return felt

@@ -1,34 +1,52 @@
 """A stream of arrays: any iterable of `(X, U)`, `(X, U, groups)` or `(X, U, groups, projections)`."""
 
+import hashlib
 from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any
 
-import joblib
 import numpy as np
+from numpy.typing import NDArray
 
 from unconstrain.arrays import check_actions, check_finite, check_groups, check_numbers, check_projections
 from unconstrain.errors import DataError
-from unconstrain.recordings.blocks import Array, Block
+from unconstrain.recordings.blocks import (
+    Array,
+    Block,
+    Episode,
+    Loaded,
+    Motion,
+    leave_out_slow,
+    number_values,
+)
 from unconstrain.samples import Samples
 
 FORMS = "(X, U), (X, U, groups) or (X, U, groups, projections)"
 
 
 class Batches:
-    """Blocks of `batch_rows` samples from batches of any size.
+    """Samples from batches of any size.
 
-    given: an iterable of `(X, U)`, `(X, U, groups)` or `(X, U, groups, projections)`, or a function without arguments
-        that returns one. A function, and anything that can be iterated anew such as a list, can be read more than
-        once; an iterator cannot.
+    Parameters
+    ----------
+    given : iterable, or function without arguments that returns one
+        Of batches. A function, and anything that can be iterated anew such as a list, can be read more than once; an
+        iterator cannot.
+    min_speed : float, optional
+        Samples with an action shorter than this are left out.
     """
 
-    def __init__(self, given: Iterable | Callable[[], Iterable], batch_rows: int):
-        self._given, self._batch_rows = given, batch_rows
+    relabels = False
+    whole_episodes_for = None
+    row_groups = None
+    n_rows = None
+
+    def __init__(self, given: Iterable | Callable[[], Iterable], *, min_speed: float | None = None) -> None:
+        self._given, self._min_speed = given, min_speed
         self._held: list[Samples] = []  # what was read of an iterator before its time
         self._rest: Iterator[Samples] | None = None
-        self.n_rows: int | None = None
         self.repeatable = callable(given) or not isinstance(given, Iterator)
         first = next(self._batches(), None)
         if first is None:
@@ -37,43 +55,50 @@ class Batches:
             self._held.append(first)
         self._first = first
         self.scalar_actions = self._scalar
-        self.tells_constraints = first.projections is not None
+        self.knows_projections = first.projections is not None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of state and action dimensions."""
+        return self._first.states.shape[1], self._first.actions.shape[1]
 
     def head(self) -> tuple[Array, Array]:
-        return self._first[0], self._first[1]
+        """Return states (N, n) and actions (N, d) of the first batch."""
+        return self._first.states, self._first.actions
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[Array, Array]:
-        """The first `n_rows` rows: no one can say what an iterator will still bring."""
+        """Return the first `n_rows` rows: no one can say what an iterator will still bring."""
         taken: list[Samples] = []
         count = 0
         for batch in self._batches() if self.repeatable else chain(list(self._held), self._remaining()):
             if not self.repeatable and len(taken) >= len(self._held):
                 self._held.append(batch)
             taken.append(batch)
-            count += len(batch[0])
+            count += len(batch.states)
             if count >= n_rows:
                 break
-        X, U = (np.concatenate([batch[i] for batch in taken])[:n_rows] for i in (0, 1))
+        X = np.concatenate([batch.states for batch in taken])[:n_rows]
+        U = np.concatenate([batch.actions for batch in taken])[:n_rows]
         return X, U
 
-    def blocks(self, start: int = 0, stop: int | None = None) -> Generator[Block, None, None]:
-        batches: Iterator[Samples] = (
-            self._batches() if self.repeatable else chain(self._drained(), self._remaining())
-        )
+    def blocks(
+        self, batch_rows: int, start: int = 0, stop: int | None = None
+    ) -> Generator[Block, None, None]:
+        """Read blocks of `batch_rows` samples from row `start`, where an earlier block ended."""
         waiting: list[Samples] = []
         count, position = 0, 0
-        for batch in batches:
+        for batch in self._from_the_beginning():
             if position < start:  # read before
-                skipped = min(len(batch[0]), start - position)
+                skipped = min(len(batch.states), start - position)
                 position += skipped
                 batch = _rows(batch, slice(skipped, None))
-            while len(batch[0]):
-                taken = _rows(batch, slice(self._batch_rows - count))
-                batch = _rows(batch, slice(self._batch_rows - count, None))
+            while len(batch.states):
+                taken = _rows(batch, slice(batch_rows - count))
+                batch = _rows(batch, slice(batch_rows - count, None))
                 waiting.append(taken)
-                count += len(taken[0])
-                if count == self._batch_rows:
-                    yield Block(position, position + count, partial(_joined, waiting))
+                count += len(taken.states)
+                if count == batch_rows:
+                    yield Block(position, position + count, partial(self._load, waiting))
                     waiting, position, count = [], position + count, 0
         if position < start:
             raise DataError(
@@ -81,11 +106,43 @@ class Batches:
                 "checkpoint"
             )
         if count:
-            yield Block(position, position + count, partial(_joined, waiting))
+            yield Block(position, position + count, partial(self._load, waiting))
+
+    def labels(self, start: int, stop: int, *, whole: bool = False) -> Iterator[tuple[NDArray[Any], int]]:
+        """Refuse: rows of batches are read once, all of them."""
+        raise DataError("batches of arrays cannot be divided: give files")
+
+    def read_all(self, batch_rows: int | None) -> Iterator[Loaded]:
+        """Read everything there is, in blocks, or with None a batch at a time."""
+        blocks = (
+            (Block(0, 0, partial(self._load, [batch])) for batch in self._from_the_beginning())
+            if batch_rows is None
+            else self.blocks(batch_rows)
+        )
+        for block in blocks:
+            loaded = block.load()
+            samples, U = loaded.samples, loaded.samples.actions
+            groups, names = np.zeros(len(U), dtype=np.int64), [0]
+            if samples.groups is not None:
+                groups, names = number_values(samples.groups)
+            yield replace(
+                loaded,
+                samples=samples._replace(groups=groups),
+                episodes=tuple(Episode((name,), str(name)) for name in names),
+                motion=loaded.motion or Motion(len(U), bool(np.any(U)), 0.0),
+            )
 
     def identity(self) -> str:
-        first = (self._first.states, self._first.actions, self._first.projections)
-        return f"batches that begin with {joblib.hash([np.ascontiguousarray(a) for a in first if a is not None])}"
+        """Say what tells this source from another: a digest of the first batch."""
+        digest = hashlib.blake2b(digest_size=16)
+        for array in (self._first.states, self._first.actions, self._first.projections):
+            if array is not None:
+                digest.update(f"{array.dtype} {array.shape}".encode())
+                digest.update(np.ascontiguousarray(array).data)
+        return f"batches that begin with {digest.hexdigest()}, {self._min_speed}"
+
+    def _from_the_beginning(self) -> Iterator[Samples]:
+        return self._batches() if self.repeatable else chain(self._drained(), self._remaining())
 
     def _remaining(self) -> Iterator[Samples]:
         assert self._rest is not None
@@ -96,7 +153,7 @@ class Batches:
             yield self._held.pop(0)
 
     def _batches(self) -> Iterator[Samples]:
-        """The batches, checked; of an iterator those to come."""
+        """Return the batches, checked; of an iterator those to come."""
         given: Any = self._given() if callable(self._given) else self._given
         checked = self._checked(given)
         if not self.repeatable:
@@ -104,15 +161,10 @@ class Batches:
         return checked
 
     def _checked(self, given: Iterable) -> Iterator[Samples]:
-        try:
-            numbered = enumerate(iter(given))
-        except TypeError:
-            raise DataError(
-                f"source must be a Parquet file or folder, or an iterable of {FORMS}, got {given!r:.80}"
-            ) from None
         shape: tuple[int, int] | None = None
         known: bool | None = None  # whether the first batch has projections
-        for i, item in numbered:
+        labelled: bool | None = None  # whether it has groups
+        for i, item in enumerate(given):
             if not isinstance(item, tuple | list) or len(item) not in (2, 3, 4):
                 raise DataError(f"batch {i} (counted from 0) must be {FORMS}")
             X = check_numbers(item[0], f"X of batch {i}")
@@ -140,10 +192,14 @@ class Batches:
                     f"batch {i} (counted from 0) has {has} but the first {first}: give them for all, NaN where they "
                     "are not known, or for none"
                 )
+            groups = check_groups(item[2] if len(item) > 2 else None, len(X))
+            labelled = groups is not None if labelled is None else labelled
+            if labelled != (groups is not None):
+                raise DataError("some batches have groups and some do not: give them for all, or for none")
             yield Samples(
                 X,
                 U,
-                check_groups(item[2] if len(item) > 2 else None, len(X)),
+                groups,
                 None if N is None else self._projections(N, U, i),
             )
 
@@ -153,18 +209,20 @@ class Batches:
         except DataError as error:
             raise DataError(f"batch {i} (counted from 0): {error}") from None
 
+    def _load(self, batches: list[Samples]) -> Loaded:
+        loaded = Loaded(_joined(batches))
+        return loaded if self._min_speed is None else leave_out_slow(loaded, self._min_speed)
+
 
 def _rows(batch: Samples, rows: slice) -> Samples:
-    X, U, *others = batch
-    return Samples(X[rows], U[rows], *(None if array is None else array[rows] for array in others))
+    X, U, groups, N = batch[:4]
+    return Samples(X[rows], U[rows], *(None if array is None else array[rows] for array in (groups, N)))
 
 
 def _joined(batches: list[Samples]) -> Samples:
     if len(batches) == 1:
         return batches[0]
     labels = [batch.groups for batch in batches if batch.groups is not None]
-    if labels and len(labels) < len(batches):
-        raise DataError("some batches have groups and some do not: give them for all, or for none")
     known = [batch.projections for batch in batches if batch.projections is not None]
     return Samples(
         np.concatenate([batch.states for batch in batches]),

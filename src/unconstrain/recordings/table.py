@@ -1,9 +1,9 @@
-"""A recording as columns: what every file format is turned into before the columns get their roles."""
+"""A file as columns: what every format is read as before the columns get their roles."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -11,58 +11,132 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
+from unconstrain.recordings.columns import Key, Keys
 
-Key = str | int  # a column's name, or its position counted from 0
+Array = NDArray[np.float64]
+
 MOST_LISTED = 20
 
 # Squares of larger numbers overflow; no recording holds them but by mistake.
 LARGEST = 1e150
 
 
-def row(index: int) -> str:
-    """Where a sample is, in a format that has no lines."""
-    return f"row {index} (counted from 0)"
+class Field(NamedTuple):
+    """A column of a file, or one of the numbers of a column of lists.
+
+    Parameters
+    ----------
+    column : str
+        The column's name, "" where the file has no header.
+    nth : int
+        Which of the columns of that name, from 0: names repeat in real recordings.
+    component : int or None
+        Which number of the lists; None for a column by itself.
+    width : int
+        How many numbers each list holds; 0 for a column by itself.
+    called : str
+        How a sentence speaks of it: by its name where that is enough.
+    kind : str
+        "number", "text" or the Arrow type, by the file that was looked at first.
+    """
+
+    column: str
+    nth: int
+    component: int | None
+    width: int
+    called: str
+    kind: str
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """The column it is read from."""
+        return self.column, self.nth
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column: a flat Arrow array.
+    """One column as a user may choose it.
 
-    `name` is "" where the file has no header. An array (N, k) in the file stands for k columns, named
-    `array[0]`, `array[1]`, ...; each is then `part_of` that array, whose name selects them all.
+    An array (N, k) in the file stands for k columns, named `array[0]`, `array[1]`, ...; each is then `part_of` that
+    array, whose name selects them all.
     """
 
     name: str
-    values: Any
+    kind: pa.DataType
+    length: int | None
+    """Number of rows; None where they are not counted yet."""
+    nth: int = 0
     part_of: str = ""
-
-    @property
-    def component(self) -> int | None:
-        """Which number of its array it is, or None for a column by itself."""
-        return int(self.name[len(self.part_of) + 1 : -1]) if self.part_of else None
+    component: int | None = None
+    width: int = 0
 
 
 @dataclass(frozen=True)
-class Table:
-    """The columns of one file in their order; names may repeat, as they do in real recordings.
+class Header:
+    """The columns of a file in their order; names may repeat, as they do in real recordings.
 
-    `path` is the file as the user wrote it; `place` tells where in it a sample is ("line 14");
-    `unusable` says of what cannot stand for columns what it is instead.
+    Parameters
+    ----------
+    path : str
+        The file as the user wrote it.
+    columns : sequence of Column
+    lists : mapping of str to (pyarrow.DataType, int or None)
+        Type and number of rows of the columns whose rows are lists or matrices.
+    unusable : mapping of str to str
+        Of what cannot stand for columns, what it is instead.
     """
 
     path: str
     columns: Sequence[Column]
-    place: Callable[[int], str] = row
+    lists: Mapping[str, tuple[pa.DataType, int | None]] = field(default_factory=dict)
     unusable: Mapping[str, str] = field(default_factory=dict)
 
-    def find(self, role: str, key: Key) -> list[int]:
-        """The positions of the columns that `key` names; several where it names an array (N, k).
+    def find(self, role: str, keys: Keys) -> tuple[Field, ...]:
+        """Find the columns that play a role.
+
+        Parameters
+        ----------
+        role : str
+            What they are for, as the user calls it.
+        keys : column, or list of columns
+            Names or positions.
+
+        Returns
+        -------
+        tuple of Field
+            Several for a key that names an array (N, k).
 
         Raises
         ------
         DataError
             There is no such column, or several carry the name.
         """
+        each = [keys] if isinstance(keys, str | int) or not isinstance(keys, Sequence) else keys
+        positions = [position for key in each for position in self._positions(role, key)]
+        if not positions:
+            raise DataError(f"no {role} columns were given for {self.path}; {self.listing()}")
+        return tuple(self._field(position) for position in positions)
+
+    def find_one(self, role: str, key: Key) -> Field:
+        """Find the one column that plays a role; see `find`."""
+        found = self.find(role, key)
+        if len(found) > 1:
+            raise DataError(f"{self.path}: {role} takes one column, but {key!r} stands for {len(found)}")
+        return found[0]
+
+    def length(self, field: Field) -> int | None:
+        """Return the number of rows of a field's column, or None where they are not counted yet."""
+        return next(c.length for c in self.columns if (c.part_of or c.name, c.nth) == field.key)
+
+    def listing(self) -> str:
+        """List the columns there are, as half a sentence."""
+        if all(not column.name for column in self.columns):
+            return f"it has no header but {len(self.columns)} columns, so choose by position, counted from 0"
+        shown = [f"{i} {column.name!r}" for i, column in enumerate(self.columns[:MOST_LISTED])]
+        more = len(self.columns) - MOST_LISTED
+        return f"its columns are {', '.join(shown)}" + (f" and {more} more" if more > 0 else "")
+
+    def _positions(self, role: str, key: Key) -> list[int]:
         if isinstance(key, str):
             return self._named(role, key)
         if isinstance(key, bool) or not isinstance(key, int | np.integer):
@@ -80,7 +154,7 @@ class Table:
             shown = ", ".join(map(str, positions))
             raise DataError(
                 f"{self.path} has {len(positions)} columns called {name!r}, at positions {shown} "
-                f"(counted from 0); choose for {role} by position instead, as in {role}=[{positions[0]}]"
+                f"(counted from 0); choose for {role}= by position instead, such as {positions[0]}"
             )
         positions = positions or [i for i, column in enumerate(self.columns) if column.part_of == name]
         if positions:
@@ -91,129 +165,223 @@ class Table:
         hint = f" (did you mean {close[0]!r}?)" if close else ""
         raise DataError(f"{self.path} has no column {name!r} for {role}{hint}; {self.listing()}")
 
-    def listing(self) -> str:
-        """The columns there are, as half a sentence."""
-        if all(not column.name for column in self.columns):
-            return f"it has no header but {len(self.columns)} columns, so choose by position, counted from 0"
-        shown = [f"{i} {column.name!r}" for i, column in enumerate(self.columns[:MOST_LISTED])]
-        more = len(self.columns) - MOST_LISTED
-        return f"its columns are {', '.join(shown)}" + (f" and {more} more" if more > 0 else "")
+    def _field(self, position: int) -> Field:
+        column = self.columns[position]
+        if not column.name:
+            called = f"column {position} (counted from 0)"
+        elif sum(other.name == column.name for other in self.columns) > 1:
+            called = f"column {position} ({column.name!r}, counted from 0)"
+        else:
+            called = f"column {column.name!r}"
+        return Field(
+            column.part_of or column.name,
+            column.nth,
+            column.component,
+            column.width,
+            called,
+            describe_kind(column.kind),
+        )
 
-    def called(self, position: int) -> str:
-        """How to speak of a column: by its name where that is enough."""
-        name = self.columns[position].name
-        if not name:
-            return f"column {position} (counted from 0)"
-        if sum(column.name == name for column in self.columns) > 1:
-            return f"column {position} ({name!r}, counted from 0)"
-        return f"column {name!r}"
 
-    def matrix(self, role: str, positions: Sequence[int]) -> NDArray[np.float64]:
-        """These columns as numbers: an array (N, k) of float64.
+@dataclass(frozen=True)
+class Cells:
+    """The values of one column, and how to speak of it.
+
+    Parameters
+    ----------
+    values : pyarrow.Array
+    path : str
+        The file as the user wrote it.
+    called : str
+        The column, as in "column 'x'".
+    place : function
+        Where in the file the i-th value is, such as "line 14".
+    """
+
+    values: Any
+    path: str
+    called: str
+    place: Callable[[int], str]
+
+    def numbers(self) -> Array:
+        """Return the values as finite numbers (N,).
 
         Raises
         ------
         DataError
-            Text, an empty cell, NaN or infinity, or columns of different lengths.
+            Text, an empty cell, NaN or infinity.
         """
-        columns = [self.numbers(position) for position in positions]
-        for position, column in zip(positions, columns, strict=True):
-            if len(column) != len(columns[0]):
-                raise DataError(
-                    f"{self.path}: {self.called(position)} has {len(column)} values for {role} "
-                    f"but {self.called(positions[0])} has {len(columns[0])}; they must be equally long"
-                )
-        return np.ascontiguousarray(np.column_stack(columns))
-
-    def numbers(self, position: int) -> NDArray[np.float64]:
-        """One column as finite float64; see `matrix`."""
-        values = self.filled(position)
+        values = self.filled()
         kind = values.type
-        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+        if is_text(kind):
             try:
                 values = values.cast(pa.float64())
             except pa.ArrowInvalid as error:
-                raise self._text(position, values) from error
+                raise self._text(values) from error
         elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
-            raise DataError(
-                f"{self.path}: {self.called(position)} holds {kind} values where numbers are needed"
-            )
+            raise DataError(f"{self.path}: {self.called} holds {kind} values where numbers are needed")
         array = values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
         bad = np.flatnonzero(~(np.abs(array) <= LARGEST))
         if len(bad):
             raise DataError(
-                f"{self.path}: {self.called(position)} holds {array[bad[0]]} at {self.place(int(bad[0]))}"
+                f"{self.path}: {self.called} holds {array[bad[0]]} at {self.place(int(bad[0]))}"
                 f"{_others(len(bad))}; fill it in or take the sample out"
             )
         return array
 
-    def flags(self, position: int) -> NDArray[np.float64]:
-        """One column as `numbers`, of which true and false are 1 and 0, in letters too; see `matrix`."""
-        values = self.filled(position)
-        if pa.types.is_string(values.type) or pa.types.is_large_string(values.type):
+    def numbers_or_nan(self) -> Array:
+        """Return the values as numbers (N,), NaN where they are missing.
+
+        Raises
+        ------
+        DataError
+            Text that is no number, or values of another type.
+        """
+        values, kind = self.values, self.values.type
+        if is_text(kind):
+            values = pc.utf8_trim_whitespace(values)
+            values = pc.if_else(pc.equal(values, ""), pa.scalar(None, kind), values)
+            try:
+                values = values.cast(pa.float64())
+            except pa.ArrowInvalid as error:
+                raise self._text(values) from error
+        elif not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_null(kind)):
+            raise DataError(
+                f"{self.path}: {self.called} holds {kind} values where numbers are needed; choose other columns"
+            )
+        return values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+
+    def flags(self) -> Array:
+        """Return flags (N,), 1 or 0; true and false count as these, in letters too.
+
+        Raises
+        ------
+        DataError
+            Anything else.
+        """
+        values = self.filled()
+        if is_text(values.type):
             try:
                 values = values.cast(pa.bool_())
             except pa.ArrowInvalid:  # numbers, or what the sentence about numbers is for
-                return self.numbers(position)
-        if pa.types.is_boolean(values.type):
+                values = None
+        if values is not None and pa.types.is_boolean(values.type):
             return values.cast(pa.float64()).to_numpy(zero_copy_only=False)
-        return self.numbers(position)
+        flags = self.numbers()
+        odd = np.flatnonzero((flags != 0) & (flags != 1))
+        if len(odd):
+            raise DataError(
+                f"{self.path}: {self.called} holds {flags[odd[0]]:g} at {self.place(int(odd[0]))}, but free is 1 "
+                "(nothing constrains the motion) or 0"
+            )
+        return flags
 
-    def filled(self, position: int) -> Any:
-        """One column without missing values, as an Arrow array; text is stripped of spaces around it.
+    def labels(self) -> NDArray[Any]:
+        """Return the values (N,) of a column that tells episodes apart: integers, or text.
+
+        Raises
+        ------
+        DataError
+            An empty cell or NaN, or values that cannot tell episodes apart.
+        """
+        values = self.filled()
+        if pa.types.is_nested(values.type):
+            raise DataError(
+                f"{self.path}: {self.called} holds {values.type} values, which do not tell episodes apart; choose "
+                "another column"
+            )
+        if pa.types.is_floating(values.type):
+            self.numbers()  # NaN is not an episode
+        elif not (pa.types.is_integer(values.type) or is_text(values.type)):
+            values = values.cast(pa.string())
+        return values.to_numpy(zero_copy_only=False)
+
+    def filled(self) -> Any:
+        """Return the values as an Arrow array without missing ones; text is stripped of spaces around it.
 
         Raises
         ------
         DataError
             An empty cell.
         """
-        values = self.columns[position].values
+        values = self.values
         if isinstance(values, pa.ChunkedArray):
             values = values.combine_chunks()
         if pa.types.is_dictionary(values.type):
             values = values.dictionary_decode()
         missing = values.is_null()
-        if pa.types.is_string(values.type) or pa.types.is_large_string(values.type):
+        if is_text(values.type):
             values = pc.utf8_trim_whitespace(values)
             missing = pc.or_(missing, pc.equal(pc.fill_null(values, ""), ""))
         count = pc.sum(missing).as_py() or 0
         if count:
             first = pc.index(missing, True).as_py()
             raise DataError(
-                f"{self.path}: {self.called(position)} is empty at {self.place(first)}"
+                f"{self.path}: {self.called} is empty at {self.place(first)}"
                 f"{_others(count)}; fill it in or take the sample out"
             )
         return values
 
-    def labels(self, position: int) -> tuple[NDArray[np.int64], tuple[str, ...]]:
-        """One column of any type as codes (N,) and their labels, in order of first appearance.
+    def component(self, i: int, width: int, role: str, name: str) -> "Cells":
+        """Return the i-th number of each of the lists, which must hold `width` numbers.
 
         Raises
         ------
         DataError
-            An empty cell or NaN.
+            A list is missing or holds another number of them.
         """
-        values = self.filled(position)
-        if pa.types.is_floating(values.type):
-            self.numbers(position)  # NaN is not an episode
-        encoded = values.dictionary_encode()
-        codes = encoded.indices.to_numpy().astype(np.int64)
-        distinct = encoded.dictionary.to_pylist()
-        return codes, tuple(
-            str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
-            for value in distinct
+        values = self.values
+        lengths = pc.list_value_length(values) if pa.types.is_nested(values.type) else None
+        if lengths is None:
+            raise DataError(
+                f"{self.path}: {name!r} holds {values.type} values where lists of {width} numbers are needed"
+            )
+        uneven = pc.or_(values.is_null(), pc.fill_null(pc.not_equal(lengths, width), True))
+        if pc.any(uneven).as_py():
+            at = self.place(pc.index(uneven, True).as_py())
+            raise DataError(
+                f"{self.path}: {name!r} holds lists that are missing or differ in length, first at {at}, so it cannot "
+                f"be used as {role}"
+            )
+        flat = values.flatten()
+        return Cells(
+            flat.take(pa.array(range(i, len(flat), width), pa.int64())), self.path, self.called, self.place
         )
 
-    def _text(self, position: int, values: Any) -> DataError:
+    def _text(self, values: Any) -> DataError:
         for index, value in enumerate(values.to_pylist()):
             try:
                 pa.scalar(value).cast(pa.float64())
             except pa.ArrowInvalid:
                 return DataError(
-                    f"{self.path}: {self.called(position)} holds {value!r} at {self.place(index)} "
+                    f"{self.path}: {self.called} holds {value!r} at {self.place(index)} "
                     "where a number is needed; correct it, or choose other columns"
                 )
-        return DataError(f"{self.path}: {self.called(position)} holds text where numbers are needed")
+        return DataError(f"{self.path}: {self.called} holds text where numbers are needed")
+
+
+def row(index: int) -> str:
+    """Say where a sample is, in a format that has no lines."""
+    return f"row {index} (counted from 0)"
+
+
+def is_text(kind: pa.DataType) -> bool:
+    """Whether an Arrow type is text."""
+    return pa.types.is_string(kind) or pa.types.is_large_string(kind)
+
+
+def is_list(kind: pa.DataType) -> bool:
+    """Whether an Arrow type is a list of values."""
+    return pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+
+
+def describe_kind(kind: pa.DataType) -> str:
+    """Say of which kind the values of an Arrow type are: those of one kind may be read together."""
+    if pa.types.is_dictionary(kind) or is_list(kind):
+        return describe_kind(kind.value_type)
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+        return "number"
+    return "text" if is_text(kind) else str(kind)
 
 
 def _others(count: int) -> str:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import warnings
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from unconstrain.errors import UnconstrainError
 from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
+from unconstrain.recordings.notes import Note
 from unconstrain.storage import Kind, encode, foreign_parts, load_object, save_object
 
 
@@ -32,11 +33,14 @@ class Progress:
         What the rows before `done` add.
     done : int
         The row to go on from.
+    notes : tuple of Note
+        What was found in the rows before.
     """
 
     accumulator: Accumulator
     sums: Sums
     done: int
+    notes: tuple[Note, ...] = ()
 
 
 def identity(policy: Policy, source: str, settings: dict[str, Any], partial: bool) -> dict[str, str]:
@@ -79,6 +83,7 @@ def save(path: str | os.PathLike[str], belongs_to: dict[str, str], progress: Pro
         Where the stream stands.
     """
     reached = {field.name: getattr(progress, field.name) for field in fields(Progress)}
+    reached["notes"] = [astuple(note) for note in progress.notes]
     try:
         save_object(path, Kind.CHECKPOINT, {"belongs_to": belongs_to, **reached})
     except UnconstrainError as error:
@@ -117,16 +122,19 @@ def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy
         raise UnconstrainError(
             f"{path} is the checkpoint of another {other[0]}: give another file, or delete this one to start anew"
         )
-    return Progress(**{field.name: found[field.name] for field in fields(Progress)})
+    notes = tuple(Note(*note) for note in found["notes"])
+    return Progress(found["accumulator"], found["sums"], found["done"], notes)
 
 
 def _check(found: dict[str, Any]) -> None:
-    kinds = {"accumulator": Accumulator, "sums": Sums, "done": int}
+    kinds = {"accumulator": Accumulator, "sums": Sums, "done": int, "notes": list}
     if set(found) != {"belongs_to", *kinds} or set(found["belongs_to"]) != {"policy", "source", "settings"}:
         raise TypeError("it holds other things than a checkpoint")
     wrong = [name for name, kind in kinds.items() if not isinstance(found[name], kind)]
     if wrong:
         raise TypeError(f"it holds another {wrong[0]}")
+    if not all(isinstance(note, tuple) and len(note) == len(fields(Note)) for note in found["notes"]):
+        raise TypeError("it holds notes that are none")
 
 
 def _digest(value: Any) -> str:

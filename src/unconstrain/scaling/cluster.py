@@ -6,9 +6,8 @@ episode belongs to is decided before, by a pass over the episode column alone, s
 it in.
 """
 
-import os
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,12 @@ from threadpoolctl import threadpool_limits
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.solve import EpisodeFolds
-from unconstrain.policies.base import Policy
 from unconstrain.progress import Report, reporting
-from unconstrain.recordings.dataset import Dataset
-from unconstrain.recordings.reading import Reading
-from unconstrain.recordings.roles import Keys
-from unconstrain.recordings.table import Key
+from unconstrain.recordings.notes import Note, combine
+from unconstrain.recordings.source import BATCH_ROWS, Openable
+from unconstrain.recordings.tables import Tables
 from unconstrain.scaling.connection import as_finished, connected
-from unconstrain.scaling.stream import BATCH_ROWS, SAMPLE_ROWS, begin, deal, finish, open_source
+from unconstrain.scaling.stream import SAMPLE_ROWS, PolicyT, begin, deal, finish, open_for, to_learn_from
 
 __all__ = ["connected", "fit"]
 
@@ -40,73 +37,84 @@ class Part:
     fold_of: dict[Any, int] | None
 
 
+@dataclass(frozen=True)
+class Added:
+    """What consecutive parts add, and what was found in them."""
+
+    accumulator: Accumulator
+    notes: tuple[Note, ...] = ()
+
+
+Setup = tuple[Accumulator, Tables, int]
+
+
 def fit(
-    policy: Policy,
-    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    policy: PolicyT,
+    recordings: Openable,
     client: Any,
     *,
-    state: Keys | None = None,
-    action: Keys | None = None,
-    episode: Key | None = None,
-    time: Key | None = None,
-    projections: Keys | None = None,
-    force: Keys | None = None,
-    force_threshold: float | None = None,
-    free: Key | None = None,
-    time_unit: str | None = None,
-    window: float = 0.2,
-    gap: float | None = None,
-    max_speed: float | None = None,
-    min_duration: float | None = None,
     partial: bool = False,
     progress: bool | Report | None = None,
     batch_rows: int = BATCH_ROWS,
     sample_rows: int = SAMPLE_ROWS,
     part_rows: int | None = None,
     random_state: int | None = 0,
-):
-    """Fit a policy to files that the workers of a Dask cluster read. Returns the policy, fitted.
+) -> PolicyT:
+    """Fit a policy to files that the workers of a Dask cluster read.
 
     The result is that of `fit_stream`, to rounding, however the data are divided and whoever computes what. The
     work of a worker that is lost is done again by others.
 
-    client: a `distributed.Client`; see `connected`. The files must be visible to the workers and to this process,
-        under the same paths.
-    part_rows: how many rows, at least, a task adds up; by default as many as make four tasks a thread.
+    Parameters
+    ----------
+    policy : ParametricPolicy, LocallyLinearPolicy
+    recordings : Recordings
+        As `unconstrain.open` returns them, or what it takes without options. The files must be visible to the workers
+        and to this process, under the same paths.
+    client : distributed.Client
+        See `connected`.
+    partial, progress, batch_rows, sample_rows, random_state
+        See `fit_stream`.
+    part_rows : int, optional
+        How many rows, at least, a task adds up; by default as many as make four tasks a thread.
 
-    All else as for `fit_stream`. Raises what it raises, and `UnconstrainError` where the cluster fails.
+    Returns
+    -------
+    policy
+        Fitted.
+
+    Raises
+    ------
+    UnconstrainError
+        As `fit_stream` does, and where the cluster fails.
     """
-    reading = Reading(
-        state=state, action=action, episode=episode, time=time, projections=projections, force=force,
-        force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
-        min_duration=min_duration,
-    )  # fmt: skip
-    opened = open_source(policy, source, reading, batch_rows)
-    if not isinstance(opened, Dataset):
+    opened = open_for(policy, recordings, batch_rows)
+    source = opened.source
+    if not isinstance(source, Tables):
         raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
-    accumulator = begin(policy, opened, sample_rows, random_state, partial=partial)
+    accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
-    rows = part_rows or max(batch_rows, -(-opened.n_rows // (PARTS_PER_THREAD * threads)))
-    parts = list(divided(opened, rows, accumulator.folds))
+    rows = part_rows or max(batch_rows, -(-source.n_rows // (PARTS_PER_THREAD * threads)))
+    parts = list(divided(source, rows, accumulator.folds))
     with reporting(progress) as report:
-        added = _added_up(client, accumulator.empty(), opened, parts, report)
-        if added.total.misjudged:
-            again = accumulator.empty(longest=added.total.longest)
-            added = _added_up(client, again, opened, parts, report)
-    accumulator.merge(added)
-    return finish(policy, accumulator, opened)
+        added = _added_up(client, accumulator.empty(), source, batch_rows, parts, report)
+        if added.accumulator.total.misjudged:
+            again = accumulator.empty(longest=added.accumulator.total.longest)
+            added = _added_up(client, again, source, batch_rows, parts, report)
+    accumulator.merge(added.accumulator)
+    return finish(policy, accumulator, opened, added.notes)
 
 
-def divided(source: Dataset, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
+def divided(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
     """The parts of a source, of `rows` rows or more, with the folds of their episodes, which are dealt out here."""
-    if source.needs_whole_episodes:
+    if source.whole_episodes_for or source.relabels:
         bounds = list(_episode_starts(source, rows))
         for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):
-            # Fragments of episodes that are differentiated are known, and dealt out, only once they are.
-            dealt = None if folds is None or source.differentiates else _folds_of(source, start, stop, folds)
+            # Fragments of episodes are known, and dealt out, only once samples are prepared.
+            dealt = None if folds is None or source.relabels else _folds_of(source, start, stop, folds)
             yield Part(start, stop, dealt)
         return
-    ends = np.cumsum([size for file in source.shards.row_groups for size in file])
+    ends = np.cumsum(source.row_groups)
     start = 0
     for end in (int(end) for end in ends):
         # Row groups are decoded as a whole, so parts end with one, unless one alone is many parts long.
@@ -118,7 +126,7 @@ def divided(source: Dataset, rows: int, folds: EpisodeFolds | None) -> Iterator[
                     start = stop
 
 
-def _folds_of(source: Dataset, start: int, stop: int, folds: EpisodeFolds) -> dict[Any, int]:
+def _folds_of(source: Tables, start: int, stop: int, folds: EpisodeFolds) -> dict[Any, int]:
     own: dict[Any, int] = {}
     for labels, _ in source.labels(start, stop):
         fold = folds.assign(labels, len(labels))
@@ -127,36 +135,37 @@ def _folds_of(source: Dataset, start: int, stop: int, folds: EpisodeFolds) -> di
     return own
 
 
-def _episode_starts(source: Dataset, rows: int) -> Iterator[int]:
+def _episode_starts(source: Tables, rows: int) -> Iterator[int]:
     """Where parts of whole episodes begin; the episodes in between have `rows` rows or more."""
     yield 0
     current: Any = None
-    ended: set[Any] = set()
+    here: set[Any] = set()  # episodes of the part at hand
+    gone: set[Any] = set()  # those of earlier parts
     last = 0
     for labels, start in source.labels(0, source.n_rows, whole=True):
         firsts = np.flatnonzero(np.concatenate([[labels[0] != current], labels[1:] != labels[:-1]]))
         for at in firsts.tolist():
-            if labels[at] in ended:
-                raise DataError(
-                    f"{source.shards.shown}: episode {labels[at]} goes on at row {start + at} (counted from 0 over all "
-                    f"files) after another began; to {source.needs_whole_episodes} the data, sort them by episode"
-                )
-            if current is not None:
-                ended.add(current)
             current = labels[at]
-            if start + at - last >= rows:
+            if start + at - last >= rows and current not in here:
                 last = start + at
+                gone |= here
+                here = set()
                 yield last
+            if current in gone:
+                raise DataError(
+                    f"episode {current} goes on at row {start + at} (counted from 0 over all files) after others were "
+                    f"read; to {source.whole_episodes_for or 'divide'} the data, sort them by episode"
+                )
+            here.add(current)
 
 
 def _added_up(
-    client: Any, empty: Accumulator, source: Dataset, parts: list[Part], report: Report
-) -> Accumulator:
+    client: Any, empty: Accumulator, source: Tables, batch_rows: int, parts: list[Part], report: Report
+) -> Added:
     import distributed
 
-    shards = replace(source.shards, threads=False)  # the cluster's tasks are its threads
     # A task, not scattered data: what a lost worker held of it can then be made again.
-    setup = client.submit(_setup, empty, replace(source, shards=shards), pure=False)
+    setup = client.submit(_setup, empty, source.in_one_thread(), batch_rows, pure=False)
     level = [client.submit(_sum_of_part, setup, part, pure=False) for part in parts]
     rows = {future.key: part.stop - part.start for future, part in zip(level, parts, strict=True)}
     left = list(level)
@@ -191,21 +200,24 @@ def _added_up(
             client.cancel([total, *left])
 
 
-def _setup(empty: Accumulator, source: Dataset) -> tuple[Accumulator, Dataset]:
-    return empty, source
+def _setup(empty: Accumulator, source: Tables, batch_rows: int) -> Setup:
+    return empty, source, batch_rows
 
 
-def _sum_of_part(setup: tuple[Accumulator, Dataset], part: Part) -> Accumulator:
-    empty, source = setup
+def _sum_of_part(setup: Setup, part: Part) -> Added:
+    empty, source, batch_rows = setup
     accumulator = empty.empty(part.fold_of)
+    notes: tuple[Note, ...] = ()
     with threadpool_limits(1, user_api="blas"):
-        for block in source.blocks(part.start, part.stop):
-            samples = block.load()
+        for block in source.blocks(batch_rows, part.start, part.stop):
+            loaded = block.load()
+            samples = to_learn_from(accumulator, loaded)
             accumulator.include(accumulator.sums(samples, deal(accumulator, samples)))
-    return accumulator.without_labels()
+            notes = combine((*notes, *loaded.notes))
+    return Added(accumulator.without_labels(), notes)
 
 
-def _sum_of_two(a: Accumulator, b: Accumulator) -> Accumulator:
-    total = a.copy()  # what a task returned may be needed again
-    total.merge(b)
-    return total
+def _sum_of_two(a: Added, b: Added) -> Added:
+    total = a.accumulator.copy()  # what a task returned may be needed again
+    total.merge(b.accumulator)
+    return Added(total, combine((*a.notes, *b.notes)))

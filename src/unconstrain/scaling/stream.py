@@ -8,11 +8,11 @@ and, where the states are differentiated or forces filtered, the longest episode
 import os
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from copy import deepcopy
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,37 +26,23 @@ from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
 from unconstrain.progress import Report, reporting
-from unconstrain.recordings import dataset
-from unconstrain.recordings.batches import Batches
-from unconstrain.recordings.blocks import Block, Source
-from unconstrain.recordings.reading import Reading
-from unconstrain.recordings.roles import Keys
-from unconstrain.recordings.table import Key
+from unconstrain.recordings.blocks import Block, Loaded, Source
+from unconstrain.recordings.notes import Note, combine
+from unconstrain.recordings.source import BATCH_ROWS, Openable, Recordings, check_batch_rows
+from unconstrain.recordings.source import open as open_recordings
 from unconstrain.samples import Samples
 from unconstrain.scaling import checkpoint as checkpoints
 from unconstrain.scaling.checkpoint import Progress
 
-BATCH_ROWS = 2**16
 SAMPLE_ROWS = 100_000
+
+PolicyT = TypeVar("PolicyT", bound=Policy)
 
 
 def fit_stream(
-    policy: Policy,
-    source: str | os.PathLike[str] | Iterable | Callable[[], Iterable],
+    policy: PolicyT,
+    recordings: Openable,
     *,
-    state: Keys | None = None,
-    action: Keys | None = None,
-    episode: Key | None = None,
-    time: Key | None = None,
-    projections: Keys | None = None,
-    force: Keys | None = None,
-    force_threshold: float | None = None,
-    free: Key | None = None,
-    time_unit: str | None = None,
-    window: float = 0.2,
-    gap: float | None = None,
-    max_speed: float | None = None,
-    min_duration: float | None = None,
     partial: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_seconds: float = 30.0,
@@ -64,8 +50,8 @@ def fit_stream(
     batch_rows: int = BATCH_ROWS,
     sample_rows: int = SAMPLE_ROWS,
     random_state: int | None = 0,
-):
-    """Fit a policy to data that need not fit into memory. Returns the policy, fitted.
+) -> PolicyT:
+    """Fit a policy to data that need not fit into memory.
 
     The result is that of `fit` on all samples with the same centres (to rounding), with `alpha="cv"` too, whose folds
     are dealt out to the episodes in the order in which they appear.
@@ -73,36 +59,16 @@ def fit_stream(
     Parameters
     ----------
     policy : ParametricPolicy, LocallyLinearPolicy
-    source
-        - a Parquet file, a folder of them, a pattern, or several files; on disk, or a URI such as
-          ``s3://bucket/folder`` that `pyarrow.fs.FileSystem.from_uri` opens. Files come in the order of their names.
-        - the folder of a LeRobot dataset, of version 2.0, 2.1 or 3.0. Its columns have known names, which are the
-          defaults below.
-        - any iterable of `(X, U)`, `(X, U, groups)` or `(X, U, groups, projections)`: states (N, n), actions (N, d),
-          episode labels (N,) or None, and what is known of the constraints, (N, d, d), NaN where nothing is; or a
-          function that returns such an iterable, which can then be read more than once.
-    state, action : column, or list of columns
-        Of files, by name. A column of lists stands for all its components, of which `name[3]` is one; those of a
-        LeRobot dataset may also go by the names that the dataset gives them. Without `action`, or with
-        ``action="differentiate"``, the actions are the derivative of the states, as in `load`.
-    episode : column
-        Its values tell episodes apart, across files. Without it every file is an episode; for ``alpha="cv"`` a single
-        file without it is cut into contiguous blocks, as `fit` does without groups.
-    time, time_unit, window, gap, max_speed, min_duration
-        For the derivative; see `load`. An episode may straddle files, but its rows must follow each other.
-    projections : column, or list of columns, optional
-        What is known of the constraints, for the risks "auto" and "constrained": a column of lists of d² numbers, the
-        projection row by row, as `save` writes it, or d² columns. Empty or NaN where it is not known.
-    force, force_threshold, free : columns, number, column, optional
-        What projections are made of instead, as by `load` and `constraints.from_recording`: contact forces, one column
-        for each action; above which a force is a contact, in their unit; and 1 where nothing constrained the motion,
-        else 0. Forces are filtered within whole episodes, so their rows must follow each other; without `episode`
-        those of a file are one.
+    recordings : Recordings
+        As `unconstrain.open` returns them, or anything that it takes without options: the path of a LeRobot dataset, or
+        an iterable of ``(X, U)``, for example. What is found while reading is in their `notes` afterwards.
     partial : bool
         Go on with a policy that is fitted already, as `partial_fit` does, instead of starting anew.
     checkpoint : path, optional
         Where to write, every `checkpoint_seconds`, how far the stream has come. If the file exists, the stream goes
         on from there, and ends with the same result as if it had not been interrupted.
+    checkpoint_seconds : float
+        Seconds between two of them.
     progress : bool or function, optional
         True shows a bar with rows, rate and time left; a function is called with rows done and rows in all.
     batch_rows : int
@@ -110,26 +76,27 @@ def fit_stream(
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed: a random sample of the files'
         rows (all of them, if there are no more), the first rows of an iterable; of these, those that move, unless
-        the risk is "direct" or "constrained".
+        the risk is "direct".
     random_state : int
         Of that sample.
+
+    Returns
+    -------
+    policy
+        Fitted. Its `recording_` are the columns and the preparation that the recordings were opened with.
 
     Raises
     ------
     DataError
         Data that cannot be read or used, in a sentence that names the file and the row.
     PolicyError
-        A policy with impossible options, or one that needs what the source does not tell: episodes for
-        ``alpha="cv"``, projections for ``risk="constrained"``.
+        A policy with impossible options, or one that needs what the recordings do not tell, such as episodes for
+        ``alpha="cv"``.
     UnconstrainError
         A checkpoint that belongs to something else or is damaged.
     """
-    reading = Reading(
-        state=state, action=action, episode=episode, time=time, projections=projections, force=force,
-        force_threshold=force_threshold, free=free, time_unit=time_unit, window=window, gap=gap, max_speed=max_speed,
-        min_duration=min_duration,
-    )  # fmt: skip
-    opened = open_source(policy, source, reading, batch_rows)
+    opened = open_for(policy, recordings, batch_rows)
+    source = opened.source
     settings = {"batch_rows": batch_rows, "sample_rows": sample_rows, "random_state": random_state}
     belongs_to: dict[str, str] = {}
     resumed = None
@@ -138,7 +105,7 @@ def fit_stream(
         resumed = checkpoints.load(checkpoint, belongs_to, policy)
         atomic.check_writable(checkpoint)
     if resumed is None:
-        resumed = Progress(begin(policy, opened, sample_rows, random_state, partial=partial), Sums(), 0)
+        resumed = Progress(begin(policy, source, sample_rows, random_state, partial=partial), Sums(), 0)
 
     def keep(reached: Progress) -> None:
         if checkpoint is not None:
@@ -146,11 +113,11 @@ def fit_stream(
 
     try:
         with reporting(progress) as report:
-            reached = _added_up(opened, resumed, report, keep, checkpoint_seconds)
+            reached = _added_up(source, batch_rows, resumed, report, keep, checkpoint_seconds)
             if reached.sums.misjudged:
-                reached = _with_scale_known(opened, reached, report, keep, checkpoint_seconds)
+                reached = _with_scale_known(source, batch_rows, reached, report, keep, checkpoint_seconds)
     except _Interrupted as stop:
-        rows = f"{stop.done:,}" + (f" of {opened.n_rows:,}" if opened.n_rows else "") + " rows"
+        rows = f"{stop.done:,}" + (f" of {source.n_rows:,}" if source.n_rows else "") + " rows"
         how = (
             "nothing was learnt; give a checkpoint to be able to go on"
             if checkpoint is None
@@ -160,31 +127,29 @@ def fit_stream(
     keep(reached)
     accumulator = reached.accumulator
     accumulator.include(reached.sums)
-    return finish(policy, accumulator, opened)
+    return finish(policy, accumulator, opened, reached.notes)
 
 
-def open_source(policy: Policy, source: Any, reading: Reading, batch_rows: int) -> Source:
-    """The source of a stream, opened. Raises `PolicyError` for a policy that cannot be learnt from it."""
+def open_for(
+    policy: Policy,
+    recordings: Openable,
+    batch_rows: int,
+) -> Recordings:
+    """Open recordings to fit a policy to.
+
+    Raises
+    ------
+    PolicyError
+        The policy cannot be learnt from them.
+    """
     if not isinstance(policy, Policy):
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")
     policy.check_options()
-    opened = _opened(source, reading, batch_rows)
-    if opened.tells_constraints and policy.risk == "direct":
+    check_batch_rows(batch_rows)
+    opened = open_recordings(recordings)
+    if opened.source.knows_projections and policy.risk == "direct":
         raise PolicyError('projections are for risk="inconsistency", and this policy has risk="direct"')
     return opened
-
-
-def _opened(source: Any, reading: Reading, batch_rows: int) -> Source:
-    if isinstance(batch_rows, bool) or not isinstance(batch_rows, int | np.integer) or batch_rows < 1:
-        raise PolicyError(f"batch_rows must be a whole number of at least 1, got {batch_rows!r}")
-    several = (
-        isinstance(source, list | tuple) and source and all(isinstance(s, str | os.PathLike) for s in source)
-    )
-    if isinstance(source, str | os.PathLike) or several:
-        return dataset.opened(source, reading, batch_rows)
-    if reading.columns:
-        raise DataError(f"{reading.columns[0]}= chooses a column of files, but the source is not a path")
-    return Batches(source, batch_rows)
 
 
 def begin(
@@ -213,17 +178,28 @@ def begin(
     return accumulator
 
 
-def finish(policy: Policy, accumulator: Accumulator, source: Source) -> Policy:
+def finish(
+    policy: PolicyT, accumulator: Accumulator, recordings: Recordings, notes: tuple[Note, ...]
+) -> PolicyT:
     """Solve; only here does the policy change."""
     total = accumulator.total
     if total.n_samples == 0:
         raise DataError(
-            "no episode has a fragment long enough to be differentiated: raise gap or max_speed, or lower window or "
-            "min_duration"
+            "no episode has a fragment long enough to be differentiated: raise gap= or max_speed=, or lower window= or "
+            "min_duration="
         )
     if total.n_samples < 2:
         raise DataError("one sample (n_samples = 1) is not enough: a policy needs 2 or more")
-    return policy.finish(accumulator, scalar_actions=source.scalar_actions)
+    policy.finish(accumulator, scalar_actions=recordings.source.scalar_actions)
+    policy.recording_ = recordings.given
+    recordings.notes = recordings.findings(notes)
+    return policy
+
+
+def to_learn_from(accumulator: Accumulator, loaded: Loaded) -> Samples:
+    """Return the samples of a block, without projections that a file has where the risk does not look at them."""
+    samples = loaded.samples
+    return samples._replace(projections=None) if accumulator.risk == "direct" else samples
 
 
 def deal(accumulator: Accumulator, samples: Samples) -> NDArray[Any] | None:
@@ -240,7 +216,9 @@ class _Interrupted(Exception):
         self.done = done
 
 
-def _with_scale_known(source: Source, reached: Progress, report: Report, keep, every: float) -> Progress:
+def _with_scale_known(
+    source: Source, batch_rows: int, reached: Progress, report: Report, keep, every: float
+) -> Progress:
     """A second pass, for the rare stream in which what counts as motion shows only at its end."""
     if not source.repeatable:
         raise DataError(
@@ -250,11 +228,16 @@ def _with_scale_known(source: Source, reached: Progress, report: Report, keep, e
         )
     again = reached.accumulator
     again.longest = reached.sums.longest
-    return _added_up(source, Progress(again, Sums(), 0), report, keep, every)
+    return _added_up(source, batch_rows, Progress(again, Sums(), 0), report, keep, every)
 
 
 def _added_up(
-    source: Source, start: Progress, report: Report, keep: Callable[[Progress], None], every: float
+    source: Source,
+    batch_rows: int,
+    start: Progress,
+    report: Report,
+    keep: Callable[[Progress], None],
+    every: float,
 ) -> Progress:
     """Where the stream stands once all of it is added up.
 
@@ -266,27 +249,30 @@ def _added_up(
     kept = clock.monotonic()
     blas = [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
     threads = min(blas, default=1)
-    loading: deque[tuple[Block, Future[Samples]]] = deque()
-    adding: deque[tuple[Block, Future[Sums]]] = deque()
+    loading: deque[tuple[Block, Future[Loaded]]] = deque()
+    adding: deque[tuple[Block, tuple[Note, ...], Future[Sums]]] = deque()
     accumulator = start.accumulator
 
     def deal_out() -> None:
         block, loaded = loading.popleft()
-        samples = loaded.result()
-        adding.append((block, pool.submit(accumulator.sums, samples, deal(accumulator, samples))))
+        read = loaded.result()
+        samples = to_learn_from(accumulator, read)
+        work = pool.submit(accumulator.sums, samples, deal(accumulator, samples))
+        adding.append((block, read.notes, work))
 
     def add() -> None:
         nonlocal reached, kept
-        block, work = adding.popleft()
+        block, found, work = adding.popleft()
+        notes = combine((*reached.notes, *found)) if found else reached.notes
         # One assignment, so that an interruption finds either all of a block in it or nothing.
-        reached = Progress(accumulator, reached.sums + work.result(), block.stop)
+        reached = Progress(accumulator, reached.sums + work.result(), block.stop, notes)
         if clock.monotonic() - kept >= every:
             keep(reached)
             kept = clock.monotonic()
         report(reached.done, source.n_rows)
 
     report(start.done, source.n_rows)
-    blocks = source.blocks(start.done)
+    blocks = source.blocks(batch_rows, start.done)
     pool = ThreadPoolExecutor(threads)
     try:
         with threadpool_limits(1, user_api="blas"), closing(blocks):

@@ -1,1 +1,39 @@
-""""""
+"""File formats: one file each, and the table of them."""
+
+from unconstrain.errors import DataError
+from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.base import Format
+from unconstrain.recordings.formats.npz import Npz
+from unconstrain.recordings.formats.parquet import Parquet
+from unconstrain.recordings.formats.text import Text
+
+FORMATS: tuple[type[Format], ...] = (Parquet, Npz, Text)
+"""In the order in which they are tried."""
+
+
+def recognize(file: File) -> Format:
+    """Open a file in the format that its content is in, or else the one that its suffix promises.
+
+    Parameters
+    ----------
+    file : File
+
+    Returns
+    -------
+    Format
+
+    Raises
+    ------
+    DataError
+        The file is empty, or of none of the formats.
+    """
+    if file.info.size == 0:
+        raise DataError(f"{file.shown} is empty: there is nothing to read")
+    for kind in FORMATS:
+        if kind.matches(file):
+            return kind(file)
+    for kind in FORMATS:
+        if file.suffix in kind.suffixes:
+            return kind(file)
+    known = ", ".join(suffix for kind in FORMATS[::-1] for suffix in kind.suffixes)
+    raise DataError(f"{file.shown} cannot be read by its suffix {file.suffix!r}; those known are {known}")

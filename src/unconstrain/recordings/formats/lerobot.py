@@ -6,32 +6,42 @@ whose components may have names in `info.json`, `episode_index`, and `timestamp`
 """
 
 import json
-import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import pyarrow as pa
 import pyarrow.fs
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.roles import Keys, Roles
-from unconstrain.recordings.shards import Shards
-from unconstrain.recordings.table import Key
+from unconstrain.recordings.columns import DIFFERENTIATE, Columns, Key, Keys
+from unconstrain.recordings.files import File, Folder, named_errors
 
 STATE, ACTION, EPISODE, TIME = "observation.state", "action", "episode_index", "timestamp"
 ABOUT = "meta/info.json"
 VERSIONS = ("v2.0", "v2.1", "v3.0")
+LARGEST_ABOUT = 64_000_000
+"""Bytes of an `info.json` that is none."""
 
 
 @dataclass(frozen=True)
 class LeRobot:
-    """What `meta/info.json` says, and the dataset's files."""
+    """A dataset: its files, and what `meta/info.json` says.
 
-    shards: Shards
-    features: dict[str, Any]
+    Parameters
+    ----------
+    files : tuple of File
+    n_samples : int or None
+        How many samples there should be.
+    features : mapping of str to dict
+        What the columns are.
+    """
+
+    files: tuple[File, ...]
+    n_samples: int | None
+    features: Mapping[str, Any]
 
     def component_names(self, column: str) -> list[str]:
-        """Names of a column's components, where there is one each."""
+        """Return the names of a column's components, where there is one each."""
         about = self.features.get(column)
         about = about if isinstance(about, dict) else {}
         names, shape = about.get("names"), about.get("shape")
@@ -40,12 +50,13 @@ class LeRobot:
         fits = isinstance(names, list) and isinstance(shape, list) and shape == [len(names)]
         return [str(name) for name in names] if fits and isinstance(names, list) else []
 
-    def roles(self, given: Roles) -> Roles:
-        """The dataset's own columns in the roles that are not given; components that go by their names, by place."""
+    def assign(self, given: Columns) -> Columns:
+        """Return the dataset's own columns in the roles that are not given; components by place, not by name."""
+        action = ACTION if given.action is None else given.action
         return replace(
             given,
             state=self._by_place(STATE, STATE if given.state is None else given.state),
-            action=self._by_place(ACTION, ACTION if given.action is None else given.action),
+            action=action if action == DIFFERENTIATE else self._by_place(ACTION, action),
             episode=EPISODE if given.episode is None else given.episode,
             time=TIME if given.time is None else given.time,
         )
@@ -60,45 +71,41 @@ class LeRobot:
         return by_place(keys) if isinstance(keys, Key) else [by_place(key) for key in keys]
 
 
-def is_meant(folder: str | os.PathLike[str]) -> bool:
-    """Whether a folder of this machine is a dataset of this kind."""
-    return os.path.isfile(os.path.join(folder, ABOUT))
+def recognize(folder: Folder) -> LeRobot | None:
+    """Open the dataset in a folder.
 
+    Parameters
+    ----------
+    folder : Folder
 
-def opened(folder: str | os.PathLike[str]) -> LeRobot | None:
-    """The dataset in a folder (or URI), or None where the folder is not of this kind.
+    Returns
+    -------
+    LeRobot or None
+        None where the folder is not of this kind.
 
-    Raises `DataError` for a version not known, and for a dataset of which samples are missing.
+    Raises
+    ------
+    DataError
+        The version is not known, or the description is damaged.
     """
-    shown = os.path.expanduser(os.fspath(folder))
-    try:
-        filesystem, path = (
-            pyarrow.fs.FileSystem.from_uri(shown) if "://" in shown else (pyarrow.fs.LocalFileSystem(), shown)
-        )
-        meta = f"{path.rstrip('/')}/{ABOUT}"
-        if filesystem.get_file_info(meta).type != pyarrow.fs.FileType.File:
+    about = folder.file(ABOUT)
+    with named_errors(folder.shown):
+        if about.info.type != pyarrow.fs.FileType.File:
             return None
-        with filesystem.open_input_stream(meta) as file:
-            text = file.read()
-    except (OSError, pa.ArrowException) as error:
-        raise DataError(f"{shown} cannot be opened ({str(error).splitlines()[0]})") from error
+    damaged = DataError(f"{about.shown} is damaged or not of a LeRobot dataset; download the dataset again")
+    if about.info.size > LARGEST_ABOUT:
+        raise damaged
     try:
-        info = json.loads(text)
+        info = json.loads(about.read())
         version, features = str(info["codebase_version"]), dict(info["features"])
         expected = int(info["total_frames"]) if "total_frames" in info else None
-    except (ValueError, KeyError, TypeError) as error:
-        raise DataError(
-            f"{meta} is damaged or not of a LeRobot dataset; download the dataset again"
-        ) from error
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
+        if isinstance(error, DataError):
+            raise
+        raise damaged from error
     if version not in VERSIONS:
         raise DataError(
-            f"{shown} is a LeRobot dataset of version {version}, and those known are {', '.join(VERSIONS)}; "
+            f"{folder.shown} is a LeRobot dataset of version {version}, and those known are {', '.join(VERSIONS)}; "
             "convert it with LeRobot's own tools"
         )
-    shards = Shards.find(f"{shown.rstrip('/')}/data")
-    if expected is not None and shards.n_rows != expected:
-        raise DataError(
-            f"{shown} holds {shards.n_rows} samples where its meta/info.json says {expected}; "
-            "download the dataset again, or give its Parquet files themselves"
-        )
-    return LeRobot(shards, features)
+    return LeRobot(folder.parquet_files("data"), expected, features)

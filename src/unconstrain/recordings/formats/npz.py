@@ -1,78 +1,255 @@
 """NumPy archives: the names of the arrays are the columns, and an array (N, k) stands for its k columns."""
 
+import hashlib
+import json
 import zipfile
-import zlib
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
+from unconstrain import demonstrations_file
 from unconstrain.errors import DataError
-from unconstrain.recordings.table import Column, Table
+from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.base import ColumnKey, Declared, damage_named
+from unconstrain.recordings.formats.saved import declare
+from unconstrain.recordings.memory import check_memory
+from unconstrain.recordings.table import Column, Header, row
+
+Shape = tuple[int, ...]
 
 
-def arrays(path: Path, shown: str) -> tuple[dict[str, np.ndarray], list[str]]:
-    """The arrays of an archive, and the names of those that hold pickled objects, which are never loaded.
+class Npz:
+    """An archive of arrays, of which only those asked for are read.
 
-    Raises
-    ------
-    DataError
-        The file is damaged or not an archive of arrays.
+    Parameters
+    ----------
+    file : File
     """
-    found: dict[str, np.ndarray] = {}
-    pickled = []
-    try:
-        with path.open("rb") as file:
-            if file.read(4) not in (b"PK\x03\x04", b"PK\x05\x06"):
-                raise DataError(
-                    f"{shown} is not an NPZ archive: write it with numpy.savez, or correct its suffix"
-                )
-        with np.load(path, allow_pickle=False) as archive:
-            for name in archive.files:
-                try:
-                    found[name] = archive[name]
-                except ValueError as error:
-                    if "allow_pickle" not in str(error):
-                        raise
-                    pickled.append(name)
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, KeyError, NotImplementedError) as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"{shown} is damaged and cannot be read as NPZ; write it again") from error
-    return found, pickled
 
+    suffixes: ClassVar[tuple[str, ...]] = (".npz",)
+    at_once: ClassVar[bool] = True
 
-def read(path: Path, shown: str) -> Table:
-    """The arrays (N,) and (N, k) as columns.
+    def __init__(self, file: File) -> None:
+        self.file = file
 
-    Raises
-    ------
-    DataError
-        The file is damaged or not an archive of arrays, or has none.
-    """
-    found, pickled = arrays(path, shown)
-    columns: list[Column] = []
-    unusable = dict.fromkeys(pickled, "holds pickled Python objects")
-    for name, array in found.items():
-        if array.ndim not in (1, 2):
-            unusable[name] = f"has shape {array.shape} where (N,) or (N, k) is needed"
-            continue
-        native = array.astype(array.dtype.newbyteorder("="), copy=False)
+    @classmethod
+    def matches(cls, file: File) -> bool:
+        """Whether the content is of this format, as its first bytes tell."""
+        if file.magic[:4] not in (b"PK\x03\x04", b"PK\x05\x06"):
+            return False
         try:
-            if array.ndim == 1:
-                columns.append(Column(name, _arrow(native)))
-            else:
-                columns += [
-                    Column(f"{name}[{i}]", _arrow(column), part_of=name) for i, column in enumerate(native.T)
-                ]
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError, UnicodeDecodeError):
-            unusable[name] = f"holds values of type {array.dtype}"
+            with file.open() as opened, zipfile.ZipFile(opened) as archive:
+                return any(name.endswith(".npy") for name in archive.namelist())
+        except Exception:  # a damaged archive; which one its suffix tells
+            return False
+
+    def columns(self) -> Header:
+        """Return the arrays (N,) and (N, k) as columns."""
+        return self._header
+
+    def declared(self) -> Declared | None:
+        """Return the roles of the arrays where this package wrote the file."""
+        if demonstrations_file.KEY not in self._arrays:
+            return None
+        (text,) = self._load([demonstrations_file.KEY])
+        return declare(str(text), self.file.shown) if text.shape == () else None
+
+    @property
+    def row_groups(self) -> tuple[int, ...]:
+        """The number of rows of the longest array."""
+        return (max((shape[0] for _, shape in self._arrays.values() if shape), default=0),)
+
+    def read(
+        self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
+    ) -> Iterator[tuple[int, pa.RecordBatch]]:
+        """Read rows of these columns as one piece, with its first row."""
+        arrays = self._load([name for name, _ in columns])
+        with damage_named(self.file.shown, "an NPZ archive"):
+            values = [to_arrow(array[start:stop]) for array in arrays]
+            rows = pa.RecordBatch.from_arrays(values, names=[name for name, _ in columns])
+        yield start, rows
+
+    def place(self, index: int) -> str:
+        """Say where in the file a row is."""
+        return row(index)
+
+    def in_one_thread(self) -> "Npz":
+        """Return the same file, decoded by one thread."""
+        return self
+
+    def identity(self) -> str:
+        """Say what tells the file from others."""
+        return repr(self.file.identity())
+
+    @cached_property
+    def _arrays(self) -> dict[str, tuple[np.dtype, Shape]]:
+        """Type and shape of each array."""
+        if self.file.magic[:4] not in (b"PK\x03\x04", b"PK\x05\x06"):
+            raise DataError(
+                f"{self.file.shown} is not an NPZ archive: write it with numpy.savez, or correct its suffix"
+            )
+        found: dict[str, tuple[np.dtype, Shape]] = {}
+        with (
+            damage_named(self.file.shown, "an NPZ archive"),
+            self.file.open() as opened,
+            zipfile.ZipFile(opened) as archive,
+        ):
+            for member in archive.infolist():
+                if member.filename.endswith(".npy"):
+                    with archive.open(member) as content:
+                        kind, shape = _read_shape(content)
+                        size = member.file_size - content.tell()
+                    if not kind.hasobject and size != kind.itemsize * int(np.prod(shape, dtype=object)):
+                        raise DataError(
+                            f"{self.file.shown} is damaged: {member.filename} does not hold what it promises; "
+                            "write it again"
+                        )
+                    found[member.filename.removesuffix(".npy")] = kind, shape
+        return found
+
+    @cached_property
+    def _header(self) -> Header:
+        return header_of(self._arrays, self.file.shown)
+
+    def _load(self, names: Sequence[str]) -> list[NDArray[Any]]:
+        about = [self._arrays[name] for name in names]
+        needed = sum(kind.itemsize * int(np.prod(shape, dtype=object)) for kind, shape in about)
+        check_memory(needed, f"reading {self.file.shown}", "leave arrays out")
+        with (
+            damage_named(self.file.shown, "an NPZ archive"),
+            self.file.open() as opened,
+            zipfile.ZipFile(opened) as archive,
+        ):
+            return [_load_member(archive, f"{name}.npy") for name in names]
+
+
+class InMemory:
+    """Demonstrations that are in memory already, read as a file would be.
+
+    Parameters
+    ----------
+    arrays : mapping of str to array
+        As `demonstrations_file.arrays_of` gives them.
+    about : dict
+        As `demonstrations_file.describe` gives it.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    at_once: ClassVar[bool] = True
+
+    def __init__(self, arrays: Mapping[str, NDArray[Any]], about: dict[str, Any]) -> None:
+        self.file = File("these demonstrations", "demonstrations", None)
+        self._arrays, self._about = arrays, about
+
+    @classmethod
+    def matches(cls, file: File) -> bool:
+        """Whether a file is of this format: none is."""
+        return False
+
+    def columns(self) -> Header:
+        """Return the arrays (N,) and (N, k) as columns."""
+        shapes = {name: (array.dtype, array.shape) for name, array in self._arrays.items()}
+        return header_of(shapes, self.file.shown)
+
+    def declared(self) -> Declared | None:
+        """Return the roles of the arrays."""
+        return declare(json.dumps(self._about), self.file.shown)
+
+    @property
+    def row_groups(self) -> tuple[int, ...]:
+        """The number of samples."""
+        return (len(self._arrays["states"]),)
+
+    def read(
+        self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
+    ) -> Iterator[tuple[int, pa.RecordBatch]]:
+        """Read samples of these columns as one piece, with its first row."""
+        values = [to_arrow(self._arrays[name][start:stop]) for name, _ in columns]
+        yield start, pa.RecordBatch.from_arrays(values, names=[name for name, _ in columns])
+
+    def place(self, index: int) -> str:
+        """Say which sample it is."""
+        return row(index)
+
+    def in_one_thread(self) -> "InMemory":
+        """Return the same demonstrations."""
+        return self
+
+    def identity(self) -> str:
+        """Say what tells these demonstrations from others: a digest of the arrays."""
+        digest = hashlib.blake2b(digest_size=16)
+        for name, array in self._arrays.items():
+            digest.update(f"{name} {array.dtype} {array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.hexdigest()
+
+
+def header_of(arrays: Mapping[str, tuple[np.dtype, Shape]], shown: str) -> Header:
+    """Describe arrays (N,) and (N, k) as columns.
+
+    Parameters
+    ----------
+    arrays : mapping of str to (dtype, shape)
+    shown : str
+        Where they are from, as the user calls it.
+
+    Returns
+    -------
+    Header
+
+    Raises
+    ------
+    DataError
+        There are none.
+    """
+    columns: list[Column] = []
+    lists: dict[str, tuple[pa.DataType, int | None]] = {}
+    unusable: dict[str, str] = {}
+    for name, (kind, shape) in arrays.items():
+        if kind.hasobject:
+            unusable[name] = "holds pickled Python objects"
+            continue
+        try:
+            values = pa.string() if kind.kind in "SU" else pa.from_numpy_dtype(kind.newbyteorder("="))
+        except (pa.ArrowException, NotImplementedError, TypeError):
+            unusable[name] = f"holds values of type {kind}"
+            continue
+        if len(shape) == 1:
+            columns.append(Column(name, values, shape[0]))
+            continue
+        if len(shape) in (2, 3):
+            lists[name] = pa.list_(values, int(np.prod(shape[1:]))), shape[0]
+        if len(shape) != 2 or not shape[1]:
+            unusable[name] = f"has shape {shape} where (N,) or (N, k) is needed"
+            continue
+        columns += [Column(f"{name}[{i}]", values, shape[0], 0, name, i, shape[1]) for i in range(shape[1])]
     if not columns and not unusable:
         raise DataError(f"{shown} is empty: there are no arrays in it")
-    return Table(shown, columns, unusable=unusable)
+    return Header(shown, columns, lists, unusable)
 
 
-def _arrow(array: np.ndarray) -> pa.Array:
-    if array.dtype.kind == "S":
-        array = np.char.decode(array, "utf-8")
-    return pa.array(np.ascontiguousarray(array))
+def to_arrow(array: NDArray[Any]) -> pa.Array:
+    """Give an array (N, ...) as an Arrow array, with a list a row where it has several dimensions."""
+    native = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("="))
+    if native.dtype.kind == "S":
+        native = np.char.decode(native, "utf-8")
+    if native.ndim == 1:
+        return pa.array(native)
+    width = int(np.prod(native.shape[1:]))
+    return pa.FixedSizeListArray.from_arrays(pa.array(native.reshape(-1)), width)
+
+
+def _read_shape(content: Any) -> tuple[np.dtype, Shape]:
+    version = np.lib.format.read_magic(content)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(content)
+    return kind, shape
+
+
+def _load_member(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    with archive.open(name) as content:
+        return np.lib.format.read_array(content, allow_pickle=False)

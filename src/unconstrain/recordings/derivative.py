@@ -12,7 +12,7 @@ EVEN = 1e-9
 
 
 def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, polyorder: int = 2) -> Array:
-    """dx/dt of one episode by Savitzky–Golay: the slope of a polynomial fitted to each moving window.
+    """Differentiate one episode by Savitzky–Golay: take the slope of a polynomial fitted to each moving window.
 
     At every stamp a polynomial of degree `polyorder` is fitted by least squares to the samples of the
     window around it, and its slope taken; near the ends, to the first or last window.
@@ -24,6 +24,7 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
     Parameters
     ----------
     states : array (N, n)
+        The states of one episode.
     time : array (N,)
         Seconds, strictly increasing.
     window : float
@@ -35,14 +36,14 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
     Returns
     -------
     array (N, n)
-        [units of the states] / s.
+        dx/dt, in [units of the states] / s.
 
     Raises
     ------
     DataError
         The window is longer than the episode, or time does not increase strictly.
     """
-    from scipy.interpolate import CubicSpline  # slow to import, and most recordings have actions
+    from scipy.interpolate import CubicSpline
     from scipy.signal import savgol_filter
 
     X, t = np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64)
@@ -72,7 +73,7 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
 
 
 def window_samples(step: float, window: float, polyorder: int = 2) -> int:
-    """The odd number of samples that spans `window` seconds best, at least `polyorder` + 1."""
+    """Return the odd number of samples that spans `window` seconds best, at least `polyorder` + 1."""
     half = max(round(window / (2 * step)), (polyorder + 1) // 2)
     return 2 * half + 1
 

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.differentiate import differentiate, spans_window, window_samples
+from unconstrain.recordings.derivative import differentiate, spans_window, window_samples
 
 coefficients = st.lists(st.floats(-10, 10), min_size=1, max_size=4)
 

@@ -1,0 +1,116 @@
+"""What a file format must do: one class a format, and a table of them in `unconstrain.recordings.formats`."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import pyarrow as pa
+
+from unconstrain.errors import DataError
+from unconstrain.recordings.columns import Columns, Key, Keys
+from unconstrain.recordings.files import File
+from unconstrain.recordings.table import Header
+
+ColumnKey = tuple[str, int]
+"""A column's name, and which of the columns of that name it is, from 0."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What files say of their own columns.
+
+    Parameters
+    ----------
+    columns : Columns
+        The roles that are taken where the user gives none.
+    saved : bool
+        Whether this package wrote the file: its episodes are then numbers into `episode_labels`, and the files of a
+        folder are recordings by themselves.
+    policy : column, or list of columns, optional
+        The true policy.
+    force, free, projections : column, or list of columns, optional
+        What is known of constraints. `Columns` has these too, but there they exclude each other, since they are a
+        choice of what to learn from; a file may hold them all.
+    state_names, action_names, episode_labels, notes : tuple of str, optional
+        As `Demonstrations` has them.
+    """
+
+    columns: Columns
+    saved: bool = False
+    policy: Keys | None = None
+    force: Keys | None = None
+    free: Key | None = None
+    projections: Keys | None = None
+    state_names: tuple[str, ...] | None = None
+    action_names: tuple[str, ...] | None = None
+    episode_labels: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+class Format(Protocol):
+    """A file of one format, opened. It can be sent to another process.
+
+    To add a format, write a class like this in a file of its own and name it in `unconstrain.recordings.formats`.
+    """
+
+    suffixes: ClassVar[tuple[str, ...]]
+    """Suffixes that promise this format, where the content does not tell."""
+
+    at_once: ClassVar[bool]
+    """Whether the file is read as a whole; otherwise rows are read as they are asked for."""
+
+    file: File
+
+    def __init__(self, file: File) -> None: ...
+
+    @classmethod
+    def matches(cls, file: File) -> bool:
+        """Whether the content is of this format, as its first bytes tell."""
+        ...
+
+    def columns(self) -> Header:
+        """Return the columns there are. Raises `DataError` for a file that is damaged, foreign or empty."""
+        ...
+
+    def declared(self) -> Declared | None:
+        """Return what the file says of its columns, if anything."""
+        ...
+
+    @property
+    def row_groups(self) -> tuple[int, ...]:
+        """The numbers of rows that are decoded together."""
+        ...
+
+    def read(
+        self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
+    ) -> Iterator[tuple[int, pa.RecordBatch]]:
+        """Read rows `start` to `stop` of these columns, in order, some at a time, each with its first row."""
+        ...
+
+    def place(self, index: int) -> str:
+        """Say where in the file a row is."""
+        ...
+
+    def in_one_thread(self) -> "Format":
+        """Return the same file, decoded by one thread: where there are as many tasks as threads already."""
+        ...
+
+    def identity(self) -> str:
+        """Say what tells the content from that of other files."""
+        ...
+
+
+@contextmanager
+def damage_named(shown: str, kind: str) -> Iterator[None]:
+    """Turn whatever a reader stumbles over in a damaged or hostile file into one sentence that names the file."""
+    try:
+        yield
+    except (DataError, GeneratorExit):
+        raise
+    except (FileNotFoundError, PermissionError) as error:
+        raise DataError(f"{shown} cannot be read: {error.strerror or error}") from error
+    except (
+        Exception
+    ) as error:  # readers of foreign files raise anything, RecursionError and MemoryError among them
+        raise DataError(f"{shown} is damaged or not {kind}; write it again") from error

@@ -1,0 +1,254 @@
+"""Pieces of files, and their columns as arrays."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from unconstrain.arrays import NOT_IDEMPOTENT, not_idempotent
+from unconstrain.errors import DataError
+from unconstrain.recordings.formats.base import ColumnKey, Format
+from unconstrain.recordings.table import Cells, Field, describe_kind, row
+
+Array = NDArray[np.float64]
+
+Places = dict[ColumnKey, list[tuple[int, Field]]]
+"""By column, which rows of an array of numbers it goes to, and as which field."""
+
+
+class Piece(NamedTuple):
+    """Consecutive rows of one file.
+
+    Parameters
+    ----------
+    format : Format
+        The file.
+    file : int
+        Which file of the recording it is.
+    first : int
+        The first row's number in the file.
+    rows : pyarrow.RecordBatch
+    at : mapping of (str, int) to int
+        Where in `rows` each column is.
+    """
+
+    format: Format
+    file: int
+    first: int
+    rows: Any
+    at: Mapping[ColumnKey, int]
+
+    def slice(self, start: int, length: int) -> "Piece":
+        """Return some of the rows."""
+        return self._replace(first=self.first + start, rows=self.rows.slice(start, length))
+
+    def column(self, key: ColumnKey) -> Any:
+        """Return a column as an Arrow array."""
+        return self.rows.column(self.at[key])
+
+    def cells(self, field: Field, role: str) -> Cells:
+        """Return a field's values. Raises `DataError` for lists of another length than the header says."""
+        cells = Cells(
+            self.column(field.key),
+            self.format.file.shown,
+            field.called,
+            lambda i: self.format.place(self.first + i),
+        )
+        if field.component is None:
+            return cells
+        return cells.component(field.component, field.width, role, field.column)
+
+    def alike(self, field: Field, role: str) -> Cells:
+        """Return a field's values, which must be of the same kind in all files of a recording."""
+        cells = self.cells(field, role)
+        kind = describe_kind(cells.values.type)
+        if kind != field.kind:
+            raise DataError(
+                f"{cells.path} and the files beside it hold {kind} and {field.kind} values in {cells.called}: write "
+                "them alike, or load them one by one"
+            )
+        return cells
+
+
+def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) -> NDArray[Any]:
+    """Read fields as finite numbers.
+
+    Parameters
+    ----------
+    pieces : sequence of Piece
+    fields : sequence of Field
+    role : str
+        What they are for, as the user calls it.
+
+    Returns
+    -------
+    array (k, N)
+        A row a field, as columns are stored: float32 where the files hold nothing else, half of what is moved about
+        then; float64 otherwise.
+
+    Raises
+    ------
+    DataError
+        Something is not a number; the sentence names file, column and row.
+    """
+    shape = (len(fields), sum(len(piece.rows) for piece in pieces))
+    single = all(_is_single(piece.column(field.key).type) for piece in pieces for field in fields)
+    numbers: NDArray[Any] = np.empty(shape, np.float32 if single else np.float64)
+    columns: Places = {}
+    for i, field in enumerate(fields):
+        columns.setdefault(field.key, []).append((i, field))
+    usual, at = True, 0
+    for piece in pieces:
+        part = numbers[:, at : at + len(piece.rows)]
+        at += len(piece.rows)
+        usual = usual and _fill(part, piece, columns)
+    # A sum of squares is finite and small if and only if every number is, and costs next to nothing. Where it
+    # overflows, as it does from 1e19 in single precision, the numbers are looked at one by one.
+    with np.errstate(over="ignore"):
+        usual = usual and float(np.dot(numbers.ravel(), numbers.ravel())) < 1e300
+    if not usual:
+        at = 0
+        for piece in pieces:
+            stop = at + len(piece.rows)
+            for i, field in enumerate(fields):
+                numbers[i, at:stop] = piece.cells(field, role).numbers()
+            at = stop
+    return numbers
+
+
+def read_flags(pieces: Sequence[Piece], field: Field) -> Array:
+    """Read flags (N,), 1 or 0. Raises `DataError` that names file, column and row of anything else."""
+    return np.concatenate([piece.cells(field, "free").flags() for piece in pieces])
+
+
+def read_labels(pieces: Sequence[Piece], field: Field) -> NDArray[Any]:
+    """Read the values (N,) that tell episodes apart. Raises `DataError` that names file, column and row of a gap."""
+    parts = [piece.alike(field, "episode").labels() for piece in pieces]
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def read_projections(
+    pieces: Sequence[Piece], columns: Sequence[ColumnKey], d: int, *, check: bool = True
+) -> Array:
+    """Read projections (N, d, d), NaN where they are missing.
+
+    Parameters
+    ----------
+    pieces : sequence of Piece
+    columns : sequence of (str, int)
+        One column of lists of d² numbers, row by row, or d² columns.
+    d : int
+    check : bool
+        Whether each has to be a projection.
+
+    Returns
+    -------
+    array (N, d, d)
+
+    Raises
+    ------
+    DataError
+        One is known in part, or is no projection; the sentence names file, column and row.
+    """
+    parts = []
+    for piece in pieces:
+        N = _read_sparse(piece, columns, d**2)
+        bad = ~np.isfinite(N).all(axis=1) & ~np.isnan(N).all(axis=1)
+        shown, place = piece.format.file.shown, piece.format.place
+        if bad.any():
+            raise DataError(
+                f"{shown}: the projection at {place(piece.first + int(np.argmax(bad)))} is neither finite numbers "
+                "throughout nor NaN throughout: correct it, or make all of it NaN"
+            )
+        N = N.reshape(-1, d, d)
+        if check and len(odd := not_idempotent(N)):
+            raise DataError(f"{shown}: the projection at {place(piece.first + int(odd[0]))} {NOT_IDEMPOTENT}")
+        parts.append(N)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
+def places(pieces: Sequence[Piece]) -> Callable[[int], str]:
+    """Return what says where in their files a row of these pieces is."""
+    bounds = np.cumsum([0, *(len(piece.rows) for piece in pieces)])
+
+    def place(index: int) -> str:
+        which = int(np.searchsorted(bounds, index, side="right")) - 1
+        piece = pieces[which]
+        at = piece.format.place(piece.first + index - int(bounds[which]))
+        return f"{at} of {piece.format.file.shown}" if piece.file != pieces[0].file else at
+
+    return place
+
+
+def _fill(numbers: NDArray[Any], piece: Piece, columns: Places) -> bool:
+    """Write a piece's columns into their rows of `numbers`; False if anything about them is unusual."""
+    arrays: list[Any] = [None] * len(numbers)
+    for key, fields in columns.items():
+        values = piece.column(key)
+        if values.null_count:
+            return False
+        if fields[0][1].component is None:
+            if not (pa.types.is_floating(values.type) or pa.types.is_integer(values.type)):
+                return False
+            flat = values.to_numpy(zero_copy_only=False)
+            for i, _ in fields:
+                arrays[i] = flat
+            continue
+        rows = _matrix(values, fields[0][1].width)
+        if rows is None:
+            return False
+        for i, field in fields:
+            arrays[i] = rows[:, field.component]
+    np.stack(arrays, out=numbers)  # one operation, where threads would wait for each other at each of many
+    return True
+
+
+def _matrix(values: Any, width: int) -> NDArray[Any] | None:
+    """Return a column of lists as (N, width), or None where it holds anything but that many floats in each row."""
+    flat = values.flatten() if hasattr(values, "flatten") else None
+    if (
+        flat is None
+        or flat.null_count
+        or not pa.types.is_floating(flat.type)
+        or len(flat) != width * len(values)
+    ):
+        return None
+    if not pa.types.is_fixed_size_list(values.type) and np.any(np.diff(values.offsets.to_numpy()) != width):
+        return None
+    return flat.to_numpy().reshape(-1, width)
+
+
+def _read_sparse(piece: Piece, columns: Sequence[ColumnKey], width: int) -> Array:
+    """Read `width` numbers a row, (N, width), NaN where they are missing."""
+    numbers = np.full((len(piece.rows), width), np.nan)
+    shown = piece.format.file.shown
+    for i, key in enumerate(columns):
+        values, name = piece.column(key), key[0]
+        if pa.types.is_null(values.type):  # a file in which none is known
+            continue
+        rows: Any = slice(None)
+        if pa.types.is_nested(values.type) and hasattr(values.type, "value_type"):
+            lengths = pc.fill_null(pc.list_value_length(values), 0).to_numpy()
+            odd = np.flatnonzero((lengths != width) & (lengths != 0))
+            if len(odd):
+                raise DataError(
+                    f"{shown}: column {name!r} holds a list of {lengths[odd[0]]} at "
+                    f"{row(piece.first + int(odd[0]))} where {width} numbers are needed"
+                )
+            rows, values = lengths > 0, values.flatten()
+        cells = Cells(values, shown, f"column {name!r}", lambda i: piece.format.place(piece.first + i))
+        plain = cells.numbers_or_nan()
+        if len(columns) == 1:
+            numbers[rows] = plain.reshape(-1, width)
+        else:
+            numbers[rows, i] = plain
+    return numbers
+
+
+def _is_single(kind: pa.DataType) -> bool:
+    return pa.types.is_float32(
+        kind.value_type if pa.types.is_nested(kind) and hasattr(kind, "value_type") else kind
+    )

@@ -1,0 +1,560 @@
+"""The one gateway to recordings: `open` finds out what there is, and what it returns reads it."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, replace
+from functools import wraps
+from itertools import chain
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from unconstrain import demonstrations_file
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
+from unconstrain.recordings.batches import FORMS, Batches
+from unconstrain.recordings.blocks import Loaded, Source
+from unconstrain.recordings.columns import Columns, Key, Keys
+from unconstrain.recordings.files import File, Folder, label, locate, short_names
+from unconstrain.recordings.formats import lerobot, recognize
+from unconstrain.recordings.formats.base import Declared, Format
+from unconstrain.recordings.formats.lerobot import LeRobot
+from unconstrain.recordings.formats.npz import InMemory
+from unconstrain.recordings.formats.parquet import Parquet
+from unconstrain.recordings.memory import check_memory
+from unconstrain.recordings.notes import Note, add_up, combine
+from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.recording import Recording, assign_roles
+from unconstrain.recordings.table import Field
+from unconstrain.recordings.tables import Tables
+from unconstrain.samples import Samples
+
+BATCH_ROWS = 2**16
+"""Rows in a block, unless another number is asked for."""
+
+Arguments = ParamSpec("Arguments")
+
+
+class Recordings:
+    """Recordings of which it is known what their columns are and how they are prepared; `open` makes them.
+
+    Nothing but what is asked for is held in memory.
+
+    Attributes
+    ----------
+    columns : Columns
+        Which column is what, as found; None for demonstrations and batches of arrays.
+    preparation : Preparation
+        What is done to samples, as found: with the unit of time that was guessed, for example.
+    given : tuple of (Columns, Preparation)
+        Both as they were given, by which other recordings can be opened alike.
+    notes : tuple of Note
+        What was found while reading; complete once the recordings were read through, by `load`, `blocks`, or a fit.
+    source : Source
+        The rows as streams and clusters read them: light blocks, which are not checked again.
+    """
+
+    def __init__(self, source: Source, columns: Columns, preparation: Preparation) -> None:
+        self.source = source
+        self.given = (columns, preparation)
+        self.notes: tuple[Note, ...] = ()
+
+    @property
+    def columns(self) -> Columns:
+        """Which column is what, as found in the first file."""
+        if not isinstance(self.source, Tables):
+            return self.given[0]
+        return self.source.recordings[0].columns
+
+    @property
+    def preparation(self) -> Preparation:
+        """What is done to samples, with the unit of time that was found, where it is the same in all files."""
+        given = self.given[1]
+        if not isinstance(self.source, Tables):
+            return given
+        units = {each.clock.unit for each in self.source.recordings if each.roles.time is not None}
+        return replace(given, time_unit=units.pop()) if len(units) == 1 else given
+
+    @property
+    def n_rows(self) -> int | None:
+        """The number of rows in the files; None where it is not known."""
+        return self.source.n_rows
+
+    def load(self) -> Demonstrations:
+        """Read all recordings into memory.
+
+        Returns
+        -------
+        Demonstrations
+            In the order of the files and their samples. Their `notes` say what was split, dropped or left out, and what
+            looks suspicious.
+
+        Raises
+        ------
+        DataError
+            Anything cannot be read or used, in one sentence that names the file and the place in it, or it does not fit
+            into memory.
+        """
+        self._check_memory()
+        several = list(self.source.read_all(None))
+        self.notes = self.findings(note for loaded in several for note in loaded.notes)
+        full = [loaded for loaded in several if len(loaded)]
+        if not full:
+            raise self._too_slow(several)
+        return self._assemble(full, _Labels(self._alone), self.notes)
+
+    def blocks(self, batch_rows: int = BATCH_ROWS) -> Iterator[Demonstrations]:
+        """Read the recordings block by block.
+
+        The blocks, one after the other, hold what `load` returns.
+
+        Parameters
+        ----------
+        batch_rows : int
+            Rows in a block: at most as many, or, where blocks hold whole episodes, at least. Files that are read as a
+            whole may give larger blocks.
+
+        Yields
+        ------
+        Demonstrations
+
+        Raises
+        ------
+        DataError
+            As `load` does; also an episode that goes on after others were read, where its samples need their
+            neighbours.
+        """
+        check_batch_rows(batch_rows)
+        self.notes = ()
+        notes: tuple[Note, ...] = ()
+        labels = _Labels(self._alone)
+        empty: list[Loaded] = []
+        some = False
+        for loaded in self.source.read_all(batch_rows):
+            notes = combine((*notes, *loaded.notes))
+            if len(loaded):
+                some = True
+                yield self._assemble([loaded], labels, add_up(loaded.notes))
+            elif not some:
+                empty.append(replace(loaded, notes=()))
+        self.notes = self.findings(notes)
+        if not some:
+            raise self._too_slow(empty)
+
+    def without_projections(self) -> "Recordings":
+        """Return the same recordings without the projections that files hold, which may be those of a simulation."""
+        if not isinstance(self.source, Tables):
+            return self
+        return Recordings(self.source.without_projections(), *self.given)
+
+    def identity(self) -> str:
+        """Say what tells these recordings from others: path, size, time of change and a digest of each file."""
+        return self.source.identity()
+
+    def findings(self, notes: Iterable[Note]) -> tuple[Note, ...]:
+        """Add up the notes of all blocks, and those that need no block: what streams set `notes` to."""
+        own = self.source.notes() if isinstance(self.source, Tables) else ()
+        return add_up((*own, *notes))
+
+    @property
+    def _alone(self) -> bool:
+        return not isinstance(self.source, Tables) or len(self.source.recordings) == 1
+
+    def _too_slow(self, several: list[Loaded]) -> DataError:
+        fastest = max((loaded.motion.fastest for loaded in several if loaded.motion), default=0.0)
+        return DataError(
+            f"no sample is as fast as min_speed={self.given[1].min_speed or 0.0:g}; "
+            f"the fastest action has speed {fastest:.4g}, so choose less"
+        )
+
+    def _check_memory(self) -> None:
+        if not isinstance(self.source, Tables):
+            return
+        pieces = [each for each in self.source.recordings if not any(file.at_once for file in each.files)]
+        numbers = sum(each.n_rows * (len(each.roles.state) + 2 * each.roles.n_actions) for each in pieces)
+        what = " and ".join(each.shown for each in pieces[:1]) + (
+            f" and {len(pieces) - 1} more" if pieces[1:] else ""
+        )
+        check_memory(8.0 * numbers, f"loading {what}", "use fit_stream, or read them block by block")
+
+    def _assemble(self, several: list[Loaded], labels: "_Labels", notes: tuple[Note, ...]) -> Demonstrations:
+        """Make demonstrations of samples; `labels` are those of the episodes met so far in this pass."""
+        shared: frozenset[str] | None = None
+        names: tuple[tuple[str, ...] | None, tuple[str, ...] | None] = (None, None)
+        if isinstance(self.source, Tables):
+            first = self.source.recordings[0]
+            shared = self.source.shared
+            names = (first.roles.state_names, first.roles.action_names)
+        numbers: dict[tuple, int] = {}
+        codes = []
+        for loaded in several:
+            groups = loaded.samples.groups
+            assert groups is not None
+            own = []
+            for episode in loaded.episodes:
+                labels.add(episode.key, episode.label)
+                own.append(numbers.setdefault(episode.key, len(numbers)))
+            codes.append(np.asarray(own, dtype=np.int64)[groups])
+
+        def joined(what: str) -> np.ndarray | None:
+            parts = [
+                getattr(loaded.samples if what in Samples._fields else loaded, what) for loaded in several
+            ]
+            if parts[0] is None or (shared is not None and what not in ("states", "actions", *shared)):
+                return None
+            return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+        states, actions = joined("states"), joined("actions")
+        assert states is not None
+        assert actions is not None
+        return Demonstrations(
+            states=states,
+            actions=actions,
+            episodes=codes[0] if len(codes) == 1 else np.concatenate(codes),
+            time=joined("time"),
+            policy=joined("policy"),
+            projections=joined("projections"),
+            forces=joined("forces"),
+            free=joined("free"),
+            state_names=names[0],
+            action_names=names[1],
+            episode_labels=[labels.of[key] for key in numbers],
+            notes=[str(note) for note in notes],
+        )
+
+
+Openable = Recordings | Demonstrations | str | os.PathLike[str] | Iterable | Callable[[], Iterable]
+"""What can be opened."""
+
+
+def open(
+    source: Openable,
+    state: Keys | None = None,
+    action: Keys | None = None,
+    time: Key | None = None,
+    episode: Key | None = None,
+    *,
+    force: Keys | None = None,
+    free: Key | None = None,
+    projections: Keys | None = None,
+    time_unit: str | None = None,
+    window: float | None = None,
+    gap: float | None = None,
+    max_speed: float | None = None,
+    min_speed: float | None = None,
+    min_duration: float | None = None,
+    force_threshold: float | None = None,
+    columns: Columns | None = None,
+    preparation: Preparation | None = None,
+) -> Recordings:
+    """Open recordings, of any format and size.
+
+    Parameters
+    ----------
+    source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
+        A file in CSV, TSV, TXT, NPZ or Parquet; on disk, or at a URI such as ``s3://bucket/file`` that
+        `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording, or
+        a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any iterable of ``(X, U)``,
+        ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
+        None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
+        iterable, which can then be read more than once.
+    state, action, time, episode, force, free, projections
+        Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
+        needs none of them.
+    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold
+        What is done to the samples; see `Preparation`.
+    columns : Columns, optional
+        Instead of single columns.
+    preparation : Preparation, optional
+        Instead of single options.
+
+    Returns
+    -------
+    Recordings
+
+    Raises
+    ------
+    DataError
+        There are no such files or columns, or they cannot be used, in one sentence that names the file.
+
+    Notes
+    -----
+    The values of the episode column mean the same in all files of a folder, where an episode may go on in the next
+    file. In files given one by one they do not, so episodes are called ``file:value`` then. Without that column every
+    file is an episode. With `force` and `force_threshold`, or with `free`, samples come with the projections that
+    `constraints.from_recording` makes of them; with `projections`, with those.
+
+    Examples
+    --------
+    >>> import unconstrain as uc
+    >>> wipes = uc.open("wipes/", state=["x", "y", "z"], time="t", episode="run")  # doctest: +SKIP
+    >>> for demos in wipes.blocks():  # doctest: +SKIP
+    ...     print(len(demos))
+    """
+    columns = _one_carrier(
+        "columns",
+        columns,
+        Columns,
+        {
+            "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
+            "projections": projections,
+        },
+    )  # fmt: skip
+    preparation = _one_carrier(
+        "preparation",
+        preparation,
+        Preparation,
+        {
+            "time_unit": time_unit, "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
+            "min_duration": min_duration, "force_threshold": force_threshold,
+        },
+    )  # fmt: skip
+    if isinstance(source, Recordings):
+        if (columns, preparation) != (Columns(), Preparation()):
+            raise DataError("these recordings are open already: give columns and options when opening them")
+        return source
+    if isinstance(source, Demonstrations):
+        return Recordings(_in_memory(source, columns, preparation), columns, preparation)
+    paths, batches = _tell_apart(source)
+    if paths:
+        return Recordings(_in_files(paths, columns, preparation), columns, preparation)
+    _check_plain(columns, preparation)
+    return Recordings(Batches(batches, min_speed=preparation.min_speed), columns, preparation)
+
+
+def _of(
+    opening: Callable[Arguments, Recordings],
+) -> Callable[[Callable], Callable[Arguments, Demonstrations]]:
+    """Give a function the arguments of another."""
+
+    def with_arguments(loading: Callable) -> Callable[Arguments, Demonstrations]:
+        @wraps(opening)
+        def load(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Demonstrations:
+            return loading(*args, **kwargs)
+
+        load.__name__, load.__qualname__, load.__doc__ = (
+            loading.__name__,
+            loading.__qualname__,
+            loading.__doc__,
+        )
+        return load
+
+    return with_arguments
+
+
+@_of(open)
+def load(*args: Any, **kwargs: Any) -> Demonstrations:
+    """Load recordings of any format into memory: ``open(...).load()``.
+
+    Takes the arguments of `open`.
+
+    Returns
+    -------
+    Demonstrations
+        In the order of the files and their samples. Their `notes` say what was split, dropped or left out, and what
+        looks suspicious.
+
+    Raises
+    ------
+    DataError
+        Anything cannot be read or used, in one sentence that names the file and the place in it.
+
+    Examples
+    --------
+    >>> import unconstrain as uc
+    >>> demos = uc.load("wipe.csv", state=["x", "y", "z"], time="t", episode="run")  # doctest: +SKIP
+    """
+    return open(*args, **kwargs).load()
+
+
+def check_batch_rows(batch_rows: int) -> None:
+    """Raise `DataError` for a number of rows that is none."""
+    if isinstance(batch_rows, bool) or not isinstance(batch_rows, int | np.integer) or batch_rows < 1:
+        raise DataError(f"batch_rows must be a whole number of at least 1, got {batch_rows!r}")
+
+
+Carrier = TypeVar("Carrier", Columns, Preparation)
+
+
+def _one_carrier(name: str, carrier: Carrier | None, kind: type[Carrier], single: dict[str, Any]) -> Carrier:
+    """Return the carrier that is given, or one made of single options."""
+    given = {option: value for option, value in single.items() if value is not None}
+    if carrier is None:
+        return kind(**given)
+    if not isinstance(carrier, kind):
+        raise DataError(f"{name}= must be a {kind.__name__}, got {carrier!r:.80}")
+    if given:
+        raise DataError(f"give either {name}= or {next(iter(given))}=, since both say the same")
+    return carrier
+
+
+def _tell_apart(
+    source: str | os.PathLike[str] | Iterable | Callable[[], Iterable],
+) -> tuple[list[str | os.PathLike[str]], Iterable | Callable[[], Iterable]]:
+    """Tell paths from batches of arrays; one of the two is empty."""
+    if isinstance(source, str | os.PathLike):
+        return [source], ()
+    if isinstance(source, list | tuple):
+        if not source:
+            raise DataError("nothing was given to open: give files, or at least one batch (X, U)")
+        are_paths = any(isinstance(each, str | os.PathLike) for each in source)
+        return (list(source), ()) if are_paths else ([], source)
+    if isinstance(source, Iterator):  # a pattern's matches, for example
+        first = next(source, None)
+        if isinstance(first, str | os.PathLike):
+            return [first, *source], ()
+        return [], chain([first], source) if first is not None else iter(())
+    if not callable(source) and not isinstance(source, Iterable):
+        raise DataError(
+            f"source must be a path or several, demonstrations, or an iterable of {FORMS}, got {source!r:.80}"
+        )
+    return [], source
+
+
+def _check_plain(columns: Columns, preparation: Preparation) -> None:
+    for carrier, default in ((columns, Columns()), (preparation, Preparation())):
+        for field in fields(carrier):
+            if field.name == "min_speed" or getattr(carrier, field.name) == getattr(default, field.name):
+                continue
+            what = "chooses a column of files" if carrier is columns else "is about columns of files"
+            raise DataError(f"{field.name}= {what}, but the source is not a path")
+
+
+def _in_memory(demos: Demonstrations, columns: Columns, preparation: Preparation) -> Tables:
+    if columns != replace(Columns(), action=columns.action):
+        raise DataError("demonstrations know their columns: choose among them with select, or give a file")
+    arrays = demonstrations_file.arrays_of(demos)
+    about = demonstrations_file.describe(demos, {name: name for name in arrays})
+    held = InMemory(arrays, about)
+    return Tables((_recording([held], "these demonstrations", "", "", 0, True, columns, preparation, None),))
+
+
+def _in_files(paths: list[str | os.PathLike[str]], columns: Columns, preparation: Preparation) -> Tables:
+    located: list[tuple[str, list[File], LeRobot | None]] = []
+    for place in locate(paths):
+        located += _recordings_of(place, columns)
+    shown = [name for name, _, _ in located]
+    several = len(located) > 1
+    every = [(file, robot is not None or len(files) > 1) for _, files, robot in located for file in files]
+    with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
+        formats = iter(list(pool.map(_open_file, every)))
+    opened = [[next(formats) for _ in files] for _, files, _ in located]
+    recordings = tuple(
+        _recording(own, name, short, stem, number, not several, columns, preparation, robot)
+        for number, (own, (name, _, robot), short, stem) in enumerate(
+            zip(opened, located, short_names(shown), label(shown), strict=True)
+        )
+    )
+    tables = Tables(recordings)
+    tables.check_alike()
+    return tables
+
+
+def _open_file(about: tuple[File, bool]) -> Format:
+    file, in_folder = about
+    opened = recognize(file)
+    if in_folder and not isinstance(opened, Parquet):
+        raise DataError(f"{file.shown} is damaged or not a Parquet file; write it again")
+    if isinstance(opened, Parquet):
+        opened.row_groups  # noqa: B018 - read here, side by side with those of other files
+    return opened
+
+
+def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:
+    if isinstance(place, File):
+        return [(place.shown, [place], None)]
+    robot = lerobot.recognize(place)
+    files = list(robot.files if robot else place.parquet_files())
+    if not files:
+        where = os.path.join(place.shown, "*.csv")
+        raise DataError(
+            f"{place.shown} is a folder without Parquet files: give its files, or a pattern such as {where}"
+        )
+    if robot is None and columns.state is None and Parquet(files[0]).declared() is not None:
+        return [(file.shown, [file], None) for file in files]  # each counts its episodes by itself
+    return [(place.shown, files, robot)]
+
+
+def _recording(
+    formats: list[Format],
+    shown: str,
+    name: str,
+    stem: str,
+    number: int,
+    alone: bool,
+    columns: Columns,
+    preparation: Preparation,
+    robot: LeRobot | None,
+) -> Recording:
+    filled = [each for each in formats if each.at_once or sum(each.row_groups) > 0]
+    if not filled:
+        raise DataError(f"{shown} has no samples")
+    if robot is not None:
+        count = sum(sum(each.row_groups) for each in formats)
+        if robot.n_samples is not None and count != robot.n_samples:
+            raise DataError(
+                f"{shown} holds {count} samples where its meta/info.json says {robot.n_samples}; "
+                "download the dataset again, or give its Parquet files themselves"
+            )
+        columns = robot.assign(columns)
+    header = filled[0].columns()
+    declared = filled[0].declared() if columns.state is None else None
+    own = columns
+    if declared is not None:
+        own = _with_declared(columns, declared)
+    elif columns.state is None and columns != Columns():
+        raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
+    try:
+        roles = assign_roles(header, own, declared, preparation, shown)
+    except DataError as error:
+        if declared is None or columns != Columns():
+            raise
+        raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations ({error})") from error
+    if robot is not None:
+        roles = replace(
+            roles,
+            state_names=_robot_names(robot, roles.state, roles.state_names),
+            action_names=_robot_names(robot, roles.action or roles.state, roles.action_names),
+        )
+    return Recording(shown, name, stem, number, alone, tuple(filled), roles, own, preparation, declared)
+
+
+def _with_declared(columns: Columns, declared: Declared) -> Columns:
+    own = declared.columns
+    return replace(
+        columns,
+        state=own.state,
+        action=own.action if columns.action is None else columns.action,
+        time=own.time if columns.time is None else columns.time,
+        episode=own.episode if columns.episode is None else columns.episode,
+    )
+
+
+def _robot_names(robot: LeRobot, fields: Sequence[Field], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Call components as the dataset calls them."""
+    called = []
+    for field, name in zip(fields, names, strict=True):
+        own = robot.component_names(field.column)
+        derived = "_dot" if name.endswith("_dot") else ""
+        called.append(own[field.component] + derived if own and field.component is not None else name)
+    return tuple(called)
+
+
+class _Labels:
+    """The labels of the episodes met in a pass: one that an episode of another recording has gets a number."""
+
+    def __init__(self, alone: bool) -> None:
+        self.of: dict[tuple, str] = {}
+        self._taken: set[str] | None = None if alone else set()
+
+    def add(self, key: tuple, label: str) -> None:
+        if key in self.of:
+            return
+        distinct, number = label, 1
+        if self._taken is not None:
+            while distinct in self._taken:
+                number += 1
+                distinct = f"{label} ({number})"
+            self._taken.add(distinct)
+        self.of[key] = distinct

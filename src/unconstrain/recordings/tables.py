@@ -1,0 +1,271 @@
+"""Recordings that lie in files, one after the other, as one source of samples."""
+
+import re
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from unconstrain.errors import DataError
+from unconstrain.recordings.blocks import Block, Loaded, Motion
+from unconstrain.recordings.notes import Note, combine
+from unconstrain.recordings.pieces import Piece
+from unconstrain.recordings.recording import Recording
+
+HEAD_ROWS = 2
+
+SAMPLED_GROUPS = 16
+"""Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
+
+UNNAMED = re.compile(r"[xu]\d+(_dot)?")
+"""What columns without a header are called."""
+
+OPTIONAL = ("time", "policy", "projections", "forces", "free")
+"""What demonstrations may have, in the order in which notes speak of them."""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Several recordings, as one source. It can be sent to another process.
+
+    Parameters
+    ----------
+    recordings : tuple of Recording
+    """
+
+    recordings: tuple[Recording, ...]
+
+    @cached_property
+    def n_rows(self) -> int:
+        """The number of rows."""
+        return sum(recording.n_rows for recording in self.recordings)
+
+    @property
+    def row_groups(self) -> tuple[int, ...]:
+        """The numbers of rows that are read together."""
+        return tuple(size for _, _, size, _ in self._groups())
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether it can be read more than once."""
+        return True
+
+    @property
+    def scalar_actions(self) -> bool:
+        """Whether the actions were of shape (N,)."""
+        return False
+
+    @property
+    def knows_projections(self) -> bool:
+        """Whether samples come with projections."""
+        return any([recording.knows_projections for recording in self.recordings])  # noqa: C419 - each may raise
+
+    @property
+    def whole_episodes_for(self) -> str | None:
+        """What is done to a sample with its neighbours, so that blocks hold whole episodes."""
+        return next((each.whole_episodes_for for each in self.recordings if each.whole_episodes_for), None)
+
+    @property
+    def relabels(self) -> bool:
+        """Whether it is known only after preparation which episodes there are."""
+        return any(each.splits or each.preparation.min_speed is not None for each in self.recordings)
+
+    def head(self) -> tuple[NDArray[Any], NDArray[Any] | None]:
+        """Read a few states (N, n) and actions (N, d); None for actions that are yet to be differentiated."""
+        first = self.recordings[0]
+        pieces = first.read_pieces(first.plain_keys())
+        piece = next(piece for piece in pieces if len(piece.rows))
+        return first.read_plain([piece.slice(0, HEAD_ROWS)])
+
+    def sample(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any] | None]:
+        """Read random rows, in order; all where there are no more. Of many row groups only some are read."""
+        if self.n_rows <= n_rows:
+            return _joined([(each, list(each.read_pieces(each.plain_keys()))) for each in self.recordings])
+        rng = np.random.default_rng(random_state)
+        groups = list(self._groups())
+        chosen: list[int] = []
+        available = 0
+        for i in rng.permutation(len(groups)):
+            if available >= n_rows and len(chosen) >= SAMPLED_GROUPS:
+                break
+            chosen.append(int(i))
+            available += groups[i][2]
+        picked = np.sort(rng.choice(available, n_rows, replace=False, shuffle=False))
+        sampled: dict[int, list[Piece]] = {}
+        at = 0
+        for i in sorted(chosen):
+            recording, number, size, first = groups[i]
+            for piece in recording.read_pieces(recording.plain_keys(), first, first + size):
+                low, high = np.searchsorted(picked, [at, at + len(piece.rows)])
+                if high > low:
+                    rows = piece.rows.take(pa.array(picked[low:high] - at))
+                    sampled.setdefault(number, []).append(piece._replace(rows=rows))
+                at += len(piece.rows)
+        return _joined([(self.recordings[number], pieces) for number, pieces in sampled.items()])
+
+    def blocks(
+        self, batch_rows: int, start: int = 0, stop: int | None = None
+    ) -> Generator[Block, None, None]:
+        """Read light blocks from row `start`, where an earlier block ended, to row `stop`."""
+        first = 0  # row of the recording at hand
+        for recording in self.recordings:
+            if stop is not None and first >= stop:
+                break
+            own = 0 if not start else max(start - first, 0)
+            end = None if stop is None else stop - first
+            if own and own >= recording.n_rows:
+                first += recording.n_rows
+                continue
+            reached = own
+            for block in recording.blocks(batch_rows, own, end):
+                yield replace(block, start=first + block.start, stop=first + block.stop)
+                reached = block.stop
+            first += reached
+
+    def labels(self, start: int, stop: int, *, whole: bool = False) -> Iterator[tuple[NDArray[Any], int]]:
+        """Read the labels of rows alone, some at a time, each with the row where they begin.
+
+        Nothing but the episode column is read. Labels of different recordings are never the same.
+        """
+        first = 0
+        for recording in self.recordings:
+            low, high = max(start - first, 0), min(stop - first, recording.n_rows)
+            field = recording.roles.episode or recording.roles.state[0]
+            at = low
+            if low < high:
+                for piece in recording.read_pieces([field.key], low, high):
+                    values = recording.labels([piece]) if whole else recording.groups([piece], at)
+                    if whole and not recording.alone:
+                        values = np.char.add(f"{recording.number}:", values.astype(np.str_))
+                    yield values, first + at
+                    at += len(piece.rows)
+            first += recording.n_rows
+
+    def read_all(self, batch_rows: int | None) -> Iterator[Loaded]:
+        """Read everything there is, as `Recordings.blocks` gives it, or with None a whole recording at a time.
+
+        After each recording it is checked that something of it is left, and moves.
+        """
+        for recording in self.recordings:
+            total = Motion(0, False, 0.0)
+            notes: tuple[Note, ...] = ()
+            for block in recording.blocks(batch_rows, everything=True):
+                loaded = block.load()
+                own = loaded.motion
+                assert own is not None
+                total = Motion(
+                    total.n_samples + own.n_samples, total.moves or own.moves, max(total.fastest, own.fastest)
+                )
+                notes = combine((*notes, *loaded.notes))
+                yield loaded
+            recording.check(total, notes)
+
+    def check_alike(self) -> None:
+        """Refuse recordings whose columns differ: positions may mean other columns in another file.
+
+        Raises
+        ------
+        DataError
+            The numbers of columns differ, or their names, where both files have some.
+        """
+        for what in ("state", "action"):
+            every = [(getattr(each.roles, f"{what}_names"), each) for each in self.recordings]
+            first, one = every[0]
+            for names, other in every[1:]:
+                if len(names) != len(first):
+                    raise DataError(
+                        f"{one.shown} has {len(first)} {what} columns but {other.shown} has {len(names)}"
+                    )
+            named = [(names, each) for names, each in every if _is_named(names)]
+            for names, other in named[1:]:
+                first, one = named[0]
+                if names != first:
+                    raise DataError(
+                        f"the {what} columns are {', '.join(first)} in {one.shown} but {', '.join(names)} in "
+                        f"{other.shown}; choose them by name, or load the files one by one and concatenate"
+                    )
+        forces = {len(each.roles.force) for each in self.recordings if each.roles.force}
+        if len(forces) > 1:
+            raise DataError(
+                f"the forces have {' and '.join(map(str, sorted(forces)))} columns in different files"
+            )
+
+    @property
+    def shared(self) -> frozenset[str]:
+        """What of `OPTIONAL` all recordings have."""
+        return frozenset.intersection(*(_present(each) for each in self.recordings))
+
+    def notes(self) -> tuple[Note, ...]:
+        """Return the notes that need no sample to be read: what files said, and what some of them do not have."""
+        declared = [each.declared for each in self.recordings if each.declared is not None]
+        said = dict.fromkeys(note for each in declared for note in each.notes)
+        notes = [Note("saved", "", note) for note in said]
+        for what in OPTIONAL:
+            missing = sum(what not in _present(each) for each in self.recordings)
+            if 0 < missing < len(self.recordings):
+                text = f"left out {what}, which {missing} of {len(self.recordings)} recordings do not have"
+                notes.append(Note("missing", "", text))
+        return tuple(notes)
+
+    def without_projections(self) -> "Tables":
+        """Return the same source, without the projections that files hold."""
+        every = [replace(each, roles=replace(each.roles, projections=())) for each in self.recordings]
+        return Tables(tuple(every))
+
+    def in_one_thread(self) -> "Tables":
+        """Return the same source, of which no file is decoded by several threads."""
+        every = [
+            replace(each, files=tuple(file.in_one_thread() for file in each.files))
+            for each in self.recordings
+        ]
+        return Tables(tuple(every))
+
+    def identity(self) -> str:
+        """Say what tells this source from another: the files, what is read of them, and how they are prepared."""
+        about = [
+            ([file.identity() for file in each.files], each.roles, each.preparation, each.alone)
+            for each in self.recordings
+        ]
+        return repr(about)
+
+    def _groups(self) -> Iterator[tuple[Recording, int, int, int]]:
+        """Yield the row groups: recording, its number, rows, and the first row's number in the recording."""
+        for number, recording in enumerate(self.recordings):
+            first = 0
+            for file in recording.files:
+                for size in file.row_groups:
+                    yield recording, number, size, first
+                    first += size
+
+
+def _joined(
+    parts: Sequence[tuple[Recording, Sequence[Piece]]],
+) -> tuple[NDArray[Any], NDArray[Any] | None]:
+    read = [recording.read_plain(pieces) for recording, pieces in parts if pieces]
+    X = [states for states, _ in read]
+    U = [actions for _, actions in read if actions is not None]
+    states = X[0] if len(X) == 1 else np.concatenate(X)
+    if len(U) < len(X):
+        return states, None
+    return states, U[0] if len(U) == 1 else np.concatenate(U)
+
+
+def _present(recording: Recording) -> frozenset[str]:
+    roles = recording.roles
+    there = {
+        "time": roles.time is not None,
+        "policy": bool(roles.policy),
+        "projections": bool(roles.projections) or recording.makes_projections,
+        "forces": bool(roles.force),
+        "free": roles.free is not None,
+    }
+    return frozenset(what for what, is_there in there.items() if is_there)
+
+
+def _is_named(names: Sequence[str]) -> bool:
+    """Whether a file has names for its columns, other than those it gets where it has none."""
+    return not all(map(UNNAMED.fullmatch, names))

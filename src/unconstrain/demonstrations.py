@@ -25,6 +25,7 @@ class Demonstrations:
     Parameters
     ----------
     states : array (N, n)
+        Where the system was.
     actions : array (N, d)
         What was done, u = N(x) π(x): the constrained action, as recorded or differentiated.
     episodes : array (N,), optional
@@ -37,24 +38,25 @@ class Demonstrations:
         The true unconstrained action π(x), known only in simulation.
     projections : array (N, d, d), optional
         What is known of the nullspace projections N(x); in simulation, the true ones. All NaN where not known.
-    forces : array (N, m), optional
-        Measured contact forces; see `constraints.from_recording`.
-    free : array (N,), optional
-        1 where the demonstrator says that nothing constrained the motion, else 0.
     state_names, action_names : sequence of str, optional
         Default x1, x2, ... and u1, u2, ...
     episode_labels : sequence of str, optional
         One per episode, each used.
     notes : sequence of str, optional
         What a user of the data should know of its reading, a sentence each.
+    forces : array (N, m), optional
+        Measured contact forces; see `constraints.from_recording`.
+    free : array (N,), optional
+        1 where the demonstrator says that nothing constrained the motion, else 0.
 
     Attributes
     ----------
-    states, actions, time, policy, projections, forces, free
+    states, actions, time, policy, projections, forces, free : array
         As above, float64.
     episodes : array (N,) of int64
         Codes 0 .. n_episodes - 1, fit to be passed as `groups=`.
     state_names, action_names, episode_labels, notes : tuple of str
+        As above.
 
     Raises
     ------
@@ -129,10 +131,12 @@ class Demonstrations:
         Parameters
         ----------
         samples : array (N,) of bool, array of int, or slice
+            Which ones.
 
         Returns
         -------
         Demonstrations
+            Those samples, in the order asked for.
 
         Raises
         ------
@@ -160,10 +164,12 @@ class Demonstrations:
         Parameters
         ----------
         which : int or str
+            The code or the label.
 
         Returns
         -------
         Demonstrations
+            The samples of that episode.
 
         Raises
         ------
@@ -194,6 +200,7 @@ class Demonstrations:
         Parameters
         ----------
         k : int
+            How many blocks.
 
         Returns
         -------
@@ -215,7 +222,7 @@ class Demonstrations:
         return self.episodes * k + k * place // sizes[self.episodes]
 
     def folds(self, kind: str | None = None, n_blocks: int = 5) -> Codes:
-        """Labels (N,) of what is held out together in cross-validation, to be passed as `groups=`.
+        """Say what is held out together in cross-validation.
 
         Parameters
         ----------
@@ -223,6 +230,11 @@ class Demonstrations:
             Whole episodes, or contiguous blocks of each. By default episodes, if there are several.
         n_blocks : int
             Blocks in each episode.
+
+        Returns
+        -------
+        array (N,)
+            Labels, to be passed as `groups=`.
 
         Raises
         ------
@@ -253,6 +265,7 @@ class Demonstrations:
         Returns
         -------
         Demonstrations
+            The other samples.
 
         Raises
         ------
@@ -285,6 +298,7 @@ class Demonstrations:
         Parameters
         ----------
         several : sequence of Demonstrations
+            At least one.
 
         Returns
         -------

@@ -12,6 +12,7 @@ def printable(text: str) -> str:
     Parameters
     ----------
     text : str
+        A name or a sentence.
 
     Returns
     -------
@@ -26,9 +27,9 @@ def printable(text: str) -> str:
 class UnconstrainError(ValueError):
     """A mistake in what the user gave, told in one sentence. Base of the family."""
 
-    def __init__(self, message: str = "") -> None:
+    def __str__(self) -> str:
         # Names of files and columns are the user's, or a stranger's: no escape sequence reaches the terminal.
-        super().__init__(printable(str(message)))
+        return printable(super().__str__())
 
 
 class DataError(UnconstrainError):

@@ -80,7 +80,7 @@ def test_fit_takes_forces_and_flags(run, table):
         (["constraints", "table.csv", "--n-centers", "3"], "--n-centers is for --model rbf"),
         (
             ["fit", "table.csv", "--force", "fx,fy", "--force-threshold", "2"],
-            "forces have 2 components and actions 3",
+            "there are 2 force columns and 3 actions",
         ),
         (["fit", "table.csv", "--force", "fx,fy,fz"], "--force needs --force-threshold"),
         (["fit", "table.csv", "--force-threshold", "2"], "--force-threshold is for forces"),

@@ -1,6 +1,5 @@
 import pytest
 
-import unconstrain as uc
 from tests.cli.commands import COLUMNS, share
 from unconstrain import limit_cycle as toy
 from unconstrain.recordings.text import write_csv
@@ -14,7 +13,7 @@ def test_recordings_are_read_as_when_the_policy_was_fitted(run, movements, tmp_p
     assert "1600 samples, 40 episodes" in out
     assert "... 20 more" in out
     others = tmp_path / "others.npz"
-    uc.save(toy.demonstrate(5, random_state=1), others)
+    toy.demonstrate(5, random_state=1).save(others)
     code, out, _ = run("evaluate", "policy.skops", others, "--state", "states", "--action", "actions")
     assert code == 0
     assert share(out.splitlines()[-2]) > 0.9

@@ -137,7 +137,6 @@ def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):
             "leave out --risk direct, or else --force, --free and --projections",
         ),
         (("--figure", "a.png", "--cluster", "local"), "--figure needs all data in memory"),
-        (("--min-speed", "0.1", "--checkpoint", "a.npz"), "--min-speed needs all data in memory"),
         (("--model", "auto", "--checkpoint", "a.npz"), "--model auto needs all data in memory"),
         (("--cluster", "local", "--checkpoint", "a.npz"), "leave out --checkpoint or --cluster"),
         (("--cluster", "tcp://127.0.0.1:1"), "no Dask scheduler answered"),

@@ -39,11 +39,12 @@ def printed(tmp_path_factory):
             for line in block.replace("\\\n", " ").strip().splitlines():
                 patch.setattr(sys, "argv", shlex.split(line))
                 assert sys.argv[0] == "unconstrain"
-                said = io.StringIO()
+                said = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
                 with contextlib.redirect_stdout(said), pytest.raises(SystemExit) as end:
                     main()
                 assert not end.value.code
-                outputs.append(said.getvalue())
+                said.flush()
+                outputs.append(said.buffer.getvalue().decode())
     assert (place / "curve.png").exists()
     assert (place / "circle.png").exists()
     return outputs, place

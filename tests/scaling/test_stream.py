@@ -388,7 +388,9 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
     for content, sentence in [(b"hello", "holds no checkpoint saved by"), (None, "damaged")]:
         if content is None:
-            stream.fit_stream(uc.ParametricPolicy(), folder, **COLUMNS, checkpoint=tmp_path / "ours.npz")
+            stream.fit_stream(
+                uc.ParametricPolicy(), uc.open(folder, **COLUMNS), checkpoint=tmp_path / "ours.npz"
+            )
             content = (tmp_path / "ours.npz").read_bytes()[:1000]
         (tmp_path / "run.npz").write_bytes(content)
         with pytest.raises(uc.errors.UnconstrainError, match=sentence):

@@ -29,7 +29,7 @@ def from_recording(
         With `forces` (N, m), `free` (N,), or both, as ``load(..., force=[...], free=...)`` reads them.
     force_threshold : float, optional
         Needed where there are forces, in their unit; see `from_forces`.
-    release, window, margin, jacobian
+    release, window, margin, jacobian : optional
         See `from_forces`.
 
     Returns
@@ -82,7 +82,7 @@ def from_forces_and_flags(
     actions : array (N, d)
     episodes : array (N,)
         Forces are filtered within each.
-    force_threshold, release, window, margin, jacobian
+    force_threshold, release, window, margin, jacobian : optional
         See `from_forces`.
 
     Returns

@@ -41,12 +41,17 @@ class Recordings:
 
     Nothing but what is asked for is held in memory.
 
+    Parameters
+    ----------
+    source : Source
+        Where the samples come from.
+    columns : Columns
+        As given.
+    preparation : Preparation
+        As given.
+
     Attributes
     ----------
-    columns : Columns
-        Which column is what, as found; None for demonstrations and batches of arrays.
-    preparation : Preparation
-        What is done to samples, as found: with the unit of time that was guessed, for example.
     given : tuple of (Columns, Preparation)
         Both as they were given, by which other recordings can be opened alike.
     notes : tuple of Note
@@ -143,17 +148,40 @@ class Recordings:
             raise self._too_slow(empty)
 
     def without_projections(self) -> "Recordings":
-        """Return the same recordings without the projections that files hold, which may be those of a simulation."""
+        """Leave out the projections that files hold, which may be those of a simulation.
+
+        Returns
+        -------
+        Recordings
+            The same recordings otherwise.
+        """
         if not isinstance(self.source, Tables):
             return self
         return Recordings(self.source.without_projections(), *self.given)
 
     def identity(self) -> str:
-        """Say what tells these recordings from others: path, size, time of change and a digest of each file."""
+        """Say what tells these recordings from others.
+
+        Returns
+        -------
+        str
+            Of each file its path, size, time of the last change, and a digest of its beginning and end.
+        """
         return self.source.identity()
 
     def findings(self, notes: Iterable[Note]) -> tuple[Note, ...]:
-        """Add up the notes of all blocks, and those that need no block: what streams set `notes` to."""
+        """Add up the notes of all blocks, and those that need no block: what streams set `notes` to.
+
+        Parameters
+        ----------
+        notes : iterable of Note
+            Of the blocks, in the order of the files.
+
+        Returns
+        -------
+        tuple of Note
+            One for each finding in each file.
+        """
         own = self.source.notes() if isinstance(self.source, Tables) else ()
         return add_up((*own, *notes))
 
@@ -259,10 +287,10 @@ def open(
         ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
         None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
         iterable, which can then be read more than once.
-    state, action, time, episode, force, free, projections
+    state, action, time, episode, force, free, projections : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
-    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold
+    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
@@ -272,6 +300,7 @@ def open(
     Returns
     -------
     Recordings
+        To be read at once, block by block, or by `fit_stream`.
 
     Raises
     ------
@@ -347,7 +376,18 @@ def _of(
 def load(*args: Any, **kwargs: Any) -> Demonstrations:
     """Load recordings of any format into memory: ``open(...).load()``.
 
-    Takes the arguments of `open`.
+    Parameters
+    ----------
+    source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
+        See `open`.
+    state, action, time, episode, force, free, projections : column, or list of columns
+        Which column is what; see `Columns`.
+    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
+        What is done to the samples; see `Preparation`.
+    columns : Columns, optional
+        Instead of single columns.
+    preparation : Preparation, optional
+        Instead of single options.
 
     Returns
     -------

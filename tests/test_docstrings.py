@@ -23,9 +23,7 @@ OPTIONAL = {"ES01", "SA01", "EX01"}
 # Held for every docstring: parameters that do not exist or stand in another order, sections unknown or misplaced.
 UNTRUE = {"PR02", "PR03", "PR10", "GL06", "GL07"}
 # Not yet rewritten: a line goes when its area has landed, and none is left in the end.
-UNFINISHED = (
-    "unconstrain.scaling.",
-)
+UNFINISHED = ("unconstrain.scaling.",)
 
 
 def described(module: str) -> Iterator[str]:

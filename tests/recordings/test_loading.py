@@ -295,7 +295,7 @@ def test_what_is_saved_comes_back_exactly(tmp_path, data, suffix):
         state_names=data.draw(st.lists(names, min_size=n, max_size=n)),
         action_names=data.draw(st.lists(names, min_size=d, max_size=d)),
         episode_labels=data.draw(st.lists(names, min_size=len(used), max_size=len(used))),
-        notes=data.draw(st.lists(names, max_size=2)),
+        notes=data.draw(st.lists(names, max_size=2, unique=True)),
     )
     path = tmp_path / f"saved{suffix}"
     demos.save(path)

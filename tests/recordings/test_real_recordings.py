@@ -25,9 +25,9 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings are no
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     """What the page's commands print, in order, and the folder they ran in."""
-    place = tmp_path_factory.mktemp("walk") / "project"
-    place.mkdir()
-    (place.parent / "shared").symlink_to(DATA.parent)
+    place = tmp_path_factory.mktemp("walk")
+    for name in ("planer_circle.csv", "curve_circle.csv"):
+        (place / name).symlink_to(DATA / name)
     outputs = []
     # In one process, to import everything once.
     with pytest.MonkeyPatch.context() as patch, contextlib.chdir(place):

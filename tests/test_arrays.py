@@ -1,5 +1,6 @@
 """What is no array of numbers, or one of another shape, is refused in a sentence that says what to do."""
 
+import pickle
 import subprocess
 import sys
 
@@ -95,3 +96,11 @@ def test_actions_in_an_impossible_unit_are_not_said_to_be_zero(scale, sentence):
 def test_metrics_do_without_scikit_learn():
     code = "import sys, unconstrain.metrics; print('sklearn' in sys.modules, 'scipy' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["False", "False"]
+
+
+def test_the_place_of_a_mistake_can_be_asked_for_also_after_a_process_has_sent_it():
+    with pytest.raises(uc.errors.DataError) as caught:
+        check_actions([[1.0, 2.0], [3.0, np.nan]])
+    sent = pickle.loads(pickle.dumps(caught.value))
+    assert (sent.row, sent.column, str(sent)) == (1, 1, str(caught.value))
+    assert uc.errors.DataError("no array").row is None

@@ -84,7 +84,9 @@ def check_finite(array: np.ndarray, name: str) -> None:
     where = f"row {place[0]}" + (f", column {place[1]}" if array.ndim > 1 else "")
     raise DataError(
         f"{name} contains {kind} in {where} ({np.count_nonzero(~finite)} such entries in all): "
-        "remove or interpolate those samples first"
+        "remove or interpolate those samples first",
+        row=int(place[0]),
+        column=int(place[1]) if array.ndim > 1 else None,
     )
 
 
@@ -258,7 +260,7 @@ def check_projections(
     check_finite(np.where(missing[:, None, None], 0.0, N), "projections")
     odd = not_idempotent(N)
     if len(odd):
-        raise DataError(f"the projection of row {odd[0]} {NOT_IDEMPOTENT}")
+        raise DataError(f"the projection of row {odd[0]} {NOT_IDEMPOTENT}", row=int(odd[0]))
     return N
 
 

@@ -33,7 +33,19 @@ class UnconstrainError(ValueError):
 
 
 class DataError(UnconstrainError):
-    """A recording, or an array standing for one, that cannot be used: missing, NaN, of the wrong shape."""
+    """A recording, or an array standing for one, that cannot be used: missing, NaN, of the wrong shape.
+
+    Parameters
+    ----------
+    message : str
+        The sentence.
+    row, column : int, optional
+        Where in an array the mistake is, counted from 0, for programs that leave it out.
+    """
+
+    def __init__(self, message: str = "", *, row: int | None = None, column: int | None = None) -> None:
+        super().__init__(message)
+        self.row, self.column = row, column
 
 
 class PolicyError(UnconstrainError):
@@ -41,7 +53,15 @@ class PolicyError(UnconstrainError):
 
 
 class ArchiveError(DataError):
-    """A saved file that is missing, damaged, of another kind, not of unconstrain, or from a newer release."""
+    """A saved file that is missing, damaged, of another kind, not of unconstrain, or from a newer release.
+
+    Parameters
+    ----------
+    message : str
+        The sentence.
+    row, column : int, optional
+        None, since a file is refused as a whole.
+    """
 
 
 class RobotError(UnconstrainError):

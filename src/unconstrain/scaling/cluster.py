@@ -67,16 +67,25 @@ def fit(
 
     Parameters
     ----------
-    policy : ParametricPolicy, LocallyLinearPolicy
+    policy : ParametricPolicy or LocallyLinearPolicy
+        Fitted in place.
     recordings : Recordings
         As `unconstrain.open` returns them, or what it takes without options. The files must be visible to the workers
         and to this process, under the same paths.
     client : distributed.Client
         See `connected`.
-    partial, progress, batch_rows, sample_rows, random_state
-        See `fit_stream`.
+    partial : bool
+        Go on with a policy that is fitted already, instead of starting anew.
+    progress : bool or callable, optional
+        True shows a bar with rows, rate and time left; a function is called with rows done and rows in all.
+    batch_rows : int
+        How many samples, at most, are added up at a time.
+    sample_rows : int
+        On how many rows centres and other features that depend on the data are placed.
     part_rows : int, optional
         How many rows, at least, a task adds up; by default as many as make four tasks a thread.
+    random_state : int, optional
+        Of the sample of rows.
 
     Returns
     -------
@@ -95,7 +104,7 @@ def fit(
     accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
     rows = part_rows or max(batch_rows, -(-source.n_rows // (PARTS_PER_THREAD * threads)))
-    parts = list(divided(source, rows, accumulator.folds))
+    parts = list(divide(source, rows, accumulator.folds))
     with reporting(progress) as report:
         added = _added_up(client, accumulator.empty(), source, batch_rows, parts, report)
         if added.accumulator.total.misjudged:
@@ -105,8 +114,23 @@ def fit(
     return finish(policy, accumulator, opened, added.notes)
 
 
-def divided(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
-    """The parts of a source, of `rows` rows or more, with the folds of their episodes, which are dealt out here."""
+def divide(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
+    """Divide a source into parts, with the folds of their episodes, which are dealt out here.
+
+    Parameters
+    ----------
+    source : Tables
+        What is to be read.
+    rows : int
+        Rows in a part, at least.
+    folds : EpisodeFolds or None
+        Folds that deal episodes out; None where λ is a number.
+
+    Yields
+    ------
+    Part
+        In the order of the rows.
+    """
     if source.whole_episodes_for or source.relabels:
         bounds = list(_episode_starts(source, rows))
         for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):

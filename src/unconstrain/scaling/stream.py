@@ -58,7 +58,8 @@ def fit_stream(
 
     Parameters
     ----------
-    policy : ParametricPolicy, LocallyLinearPolicy
+    policy : ParametricPolicy or LocallyLinearPolicy
+        Fitted in place.
     recordings : Recordings
         As `unconstrain.open` returns them, or anything that it takes without options: the path of a LeRobot dataset, or
         an iterable of ``(X, U)``, for example. What is found while reading is in their `notes` afterwards.
@@ -155,7 +156,7 @@ def open_for(
 def begin(
     policy: Policy, source: Source, sample_rows: int, random_state: int | None, *, partial: bool
 ) -> Accumulator:
-    """An accumulator whose model is placed on a sample of the source, or that goes on from the policy's own sums."""
+    """Make an accumulator, its model placed on a sample of the source, or going on from the policy's own sums."""
     goes_on = partial and hasattr(policy, "model_")
     placed_by_data = not goes_on and policy.placed_by_data
     X, U = source.sample(max(int(sample_rows), 2), random_state) if placed_by_data else source.head()
@@ -203,7 +204,7 @@ def to_learn_from(accumulator: Accumulator, loaded: Loaded) -> Samples:
 
 
 def deal(accumulator: Accumulator, samples: Samples) -> NDArray[Any] | None:
-    """The fold of each sample, (N,), or None where there are none; new episodes are dealt out."""
+    """Return the fold of each sample, (N,), or None where there are none; new episodes are dealt out."""
     if accumulator.folds is not None and samples.groups is None:
         raise PolicyError('alpha="cv" over a stream needs episodes: give batches (X, U, groups)')
     return accumulator.deal(samples)
@@ -217,9 +218,14 @@ class _Interrupted(Exception):
 
 
 def _with_scale_known(
-    source: Source, batch_rows: int, reached: Progress, report: Report, keep, every: float
+    source: Source,
+    batch_rows: int,
+    reached: Progress,
+    report: Report,
+    keep: Callable[[Progress], None],
+    every: float,
 ) -> Progress:
-    """A second pass, for the rare stream in which what counts as motion shows only at its end."""
+    """Read a second time, for the rare stream in which what counts as motion shows only at its end."""
     if not source.repeatable:
         raise DataError(
             f"an action of length {reached.sums.shortest:.3g} was taken for motion before one of length "

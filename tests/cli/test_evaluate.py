@@ -35,6 +35,26 @@ def test_options_of_the_fit_are_kept_unless_given_anew(run, tmp_path):
     assert "of 240 samples" in other
 
 
+def test_notes_are_in_the_words_of_the_options(run, tmp_path):
+    demos = toy.demonstrate(6, random_state=0)
+    write_csv(demos, tmp_path / "d.csv")
+    columns = (
+        "--state",
+        "x1,x2",
+        "--action",
+        "u1,u2",
+        "--time",
+        "t",
+        "--time-unit",
+        "ns",
+        "--episode",
+        "episode",
+    )
+    code, out, err = run("fit", "d.csv", *columns, "--model", "linear")
+    assert code == 0, err
+    assert "give --time-unit" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -110,6 +110,11 @@ def in_words_of_options(sentence: str, options: Mapping[str, str]) -> str:
     return sentence
 
 
+def in_words_of_program(sentence: str) -> str:
+    """Write a sentence of the library's in the words of the options that the program has."""
+    return in_words_of_options(sentence, _options(click.get_current_context()))
+
+
 def _options(context: click.Context) -> dict[str, str]:
     """Name the options of all commands by the arguments they are given to; those of this one come first."""
     program = context.find_root().command

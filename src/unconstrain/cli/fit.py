@@ -185,7 +185,6 @@ def _fit_stream(
     else:
         with distributed.connected(cluster) as client:
             distributed.fit(policy, opened, client, progress=True)
-    for note in opened.notes:
-        reporting.say(f"note: {note}")
+    recordings.describe_notes(opened.notes)
     policy.recording_ = recorded.kept()
     return policy

@@ -1,12 +1,14 @@
 """Which recordings a command reads, and how: options that all commands share."""
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from unconstrain.cli import reporting
+from unconstrain.cli.command import in_words_of_program
 from unconstrain.cli.declared import declared_options, gathered, is_given, option
 from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns
@@ -128,5 +130,10 @@ def describe(demos: "Demonstrations") -> None:
         f"read: {len(demos)} samples, {demos.n_episodes} episode{'s' if demos.n_episodes != 1 else ''}, "
         f"states {', '.join(demos.state_names)}, actions {', '.join(demos.action_names)}"
     )
-    for note in demos.notes:
-        reporting.say(f"note: {note}")
+    describe_notes(demos.notes)
+
+
+def describe_notes(notes: Iterable[object]) -> None:
+    """Say what was found while reading."""
+    for note in notes:
+        reporting.say(f"note: {in_words_of_program(str(note))}")

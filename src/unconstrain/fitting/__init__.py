@@ -3,7 +3,9 @@
 observation.py   what a recorded action says of the policy: Q, Q u
 moments.py       the sums a fit is solved from
 kernels/         adding samples up into them, fast
-model.py         policies that are linear in their parameters, with everything placed and no parameters
+model.py         what is asked of a model: a policy that is linear in its parameters, with everything placed
+global_model.py  one set of parameters for all states
+local_models.py  local models that are blended
 accumulator.py   the object that fits, streams and clusters drive: add, merge, solve
 sums.py          what it holds: moments by fold, and counts
 solve.py         folds, and the choice of λ

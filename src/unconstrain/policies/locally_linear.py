@@ -13,7 +13,8 @@ from unconstrain.arrays import check_number
 from unconstrain.features.base import Features, fit_features
 from unconstrain.features.centers import place_centers
 from unconstrain.features.full import as_features
-from unconstrain.fitting.model import LocalModels, Model
+from unconstrain.fitting.local_models import LocalModels
+from unconstrain.fitting.model import Model
 from unconstrain.policies.base import Policy
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from unconstrain.features.base import Features, fit_features
 from unconstrain.features.full import as_features
-from unconstrain.fitting.model import GlobalModel, Model
+from unconstrain.fitting.global_model import GlobalModel
+from unconstrain.fitting.model import Model
 from unconstrain.policies.base import Policy
 
 

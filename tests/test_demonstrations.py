@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, UnconstrainError
 
 
 def simulated(n_samples=12, n_episodes=3, seed=0):
@@ -171,3 +173,28 @@ def test_repr_tells_the_shape_of_things():
     )
     many = Demonstrations(np.ones((1, 30)), np.ones((1, 1)))
     assert repr(many) == "Demonstrations(1 sample in 1 episode; states x1, x2, x3, ..., x30 (30); actions u1)"
+
+
+def test_a_data_frame_holds_every_column():
+    pandas = pytest.importorskip("pandas")
+    N = np.broadcast_to(np.diag([1.0, 0.0]), (3, 2, 2))
+    demos = Demonstrations(
+        np.arange(6.0).reshape(3, 2), np.ones((3, 2)), [0, 0, 1], [0.0, 0.1, 0.0], np.ones((3, 2)), N,
+        ["x", "y"], ["x", "v"], ["a", "b"], free=[0, 1, 0], forces=np.zeros((3, 1)),
+    )  # fmt: skip
+    frame = demos.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert list(frame) == [
+        "episode", "time", "x", "y", "x_2", "v", "policy.x", "policy.v", "force.1", "free", "projections",
+    ]  # fmt: skip
+    assert frame["episode"].tolist() == ["a", "a", "b"]
+    np.testing.assert_array_equal(frame[["x", "y"]], demos.states)
+    np.testing.assert_array_equal(frame["projections"][1], N[1])
+
+
+def test_a_missing_pandas_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(
+        UnconstrainError, match="to_pandas needs pandas, which is not installed: pip install pandas"
+    ):
+        Demonstrations([[1.0]], [[1.0]]).to_pandas()

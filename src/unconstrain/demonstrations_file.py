@@ -1,7 +1,7 @@
-"""How demonstrations lie in files: which array is what, in NPZ and in Parquet.
+"""How demonstrations lie in files: which array is what, in an archive that NumPy opens, and in Parquet.
 
-Both hold, as JSON under the key "unconstrain", which columns play which role, and the names; NPZ in an array, Parquet
-in the metadata of its schema.
+Both hold as JSON which columns play which role, and the names: the archive as any other (see `storage`), Parquet in the
+metadata of its schema, under the key "unconstrain".
 """
 
 import json
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain import atomic
+from unconstrain import atomic, storage
 from unconstrain.errors import DataError
 
 if TYPE_CHECKING:
@@ -31,15 +31,16 @@ def write(demos: "Demonstrations", path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".parquet", ".pq"):
         raise DataError(f"cannot save {path}: choose a name that ends in .npz or .parquet")
-    with atomic.replacing(path) as temporary:
-        if suffix == ".npz":
-            found: dict[str, Any] = arrays_of(demos)
-            with temporary.open("wb") as file:
-                np.savez(file, **found | {KEY: np.array(json.dumps(describe(demos, {n: n for n in found})))})
-        else:
-            import pyarrow.parquet as pq
+    if suffix == ".npz":
+        found = arrays_of(demos)
+        storage.write(
+            path, storage.Kind.DEMONSTRATIONS, describe(demos, {name: name for name in found}), found
+        )
+        return
+    import pyarrow.parquet as pq
 
-            pq.write_table(_table(demos), temporary, write_page_checksum=True)
+    with atomic.replacing(path) as temporary:
+        pq.write_table(_table(demos), temporary, write_page_checksum=True)
 
 
 def arrays_of(demos: "Demonstrations") -> dict[str, NDArray[Any]]:

@@ -2,14 +2,17 @@
 
 import contextlib
 import io
-import json
+import os
 import pickle
+import zipfile
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import unconstrain as uc
+from unconstrain import storage
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.recordings import load
@@ -177,17 +180,24 @@ def test_saved_files_that_are_damaged_or_too_new(tmp_path):
     demos = Demonstrations(np.ones((3, 2)), np.ones((3, 2)))
     path = tmp_path / "a.npz"
     demos.save(path)
-    good = dict(np.load(path))
-    about = json.loads(str(good["unconstrain"]))
-    for changes, sentence in [
-        ({"unconstrain": np.array(json.dumps(about | {"format": 99}))}, "newer release"),
-        ({"unconstrain": np.array("{")}, "damaged and cannot be read as saved"),
-        ({"states": np.ones((2, 2))}, "damaged and cannot be read as saved"),
-        ({"episodes": np.array([0, 0, 5])}, "damaged and cannot be read as saved"),
+    about, arrays = storage.read(path, storage.Kind.DEMONSTRATIONS)
+    for changes, others, sentence in [
+        ({"format": 99}, {}, "newer release"),
+        ({"roles": {}}, {}, "damaged and cannot be read as saved"),
+        ({"roles": about["roles"] | {"time": "t"}}, {}, "damaged and cannot be read as saved"),
+        ({"state_names": 3}, {}, "damaged and cannot be read as saved"),
+        ({}, {"states": np.ones((2, 2))}, "damaged and cannot be read as saved"),
+        ({}, {"episodes": np.array([0, 0, 5])}, "damaged and cannot be read as saved"),
     ]:
-        np.savez(path, **good | changes)
+        storage.write(path, storage.Kind.DEMONSTRATIONS, about | changes, arrays | others)
         with pytest.raises(DataError, match=sentence):
             load(path)
+    storage.write(path, storage.Kind.DEMONSTRATIONS, [], {})
+    with pytest.raises(DataError, match="empty"):
+        load(path)
+    storage.write(path, storage.Kind.MOMENTS, about, arrays)
+    with pytest.raises(DataError, match=r"holds moments, not demonstrations: load them with moments.load"):
+        load(path)
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".parquet"])
@@ -200,3 +210,124 @@ def test_a_changed_byte_of_a_saved_file_is_noticed(tmp_path, suffix):
         path.write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])
         with contextlib.suppress(DataError):  # otherwise it was a byte of no consequence
             np.testing.assert_array_equal(load(path).states, states)
+
+
+def columns(tmp_path, name, **arrays):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    pq.write_table(pa.table(arrays), path, row_group_size=1000)
+    return path
+
+
+def test_the_content_of_a_file_tells_its_format(tmp_path):
+    path = columns(tmp_path, "a.csv", x=ONES, u=ONES)
+    assert len(load(path, **XU)) == 3
+    (tmp_path / "b.dat").write_bytes(npz(x=ONES, u=ONES))
+    assert len(load(tmp_path / "b.dat", **XU)) == 3
+    Demonstrations(np.ones((3, 2)), np.ones((3, 2))).save(tmp_path / "c.npz")
+    (tmp_path / "c.npz").rename(tmp_path / "c.txt")
+    assert load(tmp_path / "c.txt").states.shape == (3, 2)
+
+
+def test_pipes_and_devices_are_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    for path in (tmp_path / "pipe.csv", "/dev/zero"):
+        with pytest.raises(DataError, match="is a pipe or a device and not a file"):
+            load(path, **XU)
+    columns(tmp_path, "parts/a.parquet", x=ONES, u=ONES)
+    os.mkfifo(tmp_path / "parts" / "b.parquet")
+    assert len(load(tmp_path / "parts", **XU)) == 3
+
+
+def test_links_do_not_multiply_samples(tmp_path):
+    folder = columns(tmp_path, "parts/a.parquet", x=ONES, u=ONES).parent
+    for name in ("again", "and_again"):
+        (folder / name).symlink_to(folder)
+    (folder / "b.parquet").symlink_to(folder / "a.parquet")
+    os.link(folder / "a.parquet", folder / "c.parquet")
+    (folder / "nowhere.parquet").symlink_to(folder / "gone")
+    assert len(load(folder, **XU)) == 3
+    (folder / "nowhere.parquet").unlink()
+    assert len(load(str(folder / "*.parquet"), **XU)) == 3
+    assert len(load(str(folder / "**" / "*.parquet"), **XU)) == 3
+    for twice in (
+        [folder / "a.parquet", folder / "b.parquet"],
+        [folder, folder / "a.parquet"],
+        [folder.as_uri(), folder.as_uri()],
+    ):
+        with pytest.raises(DataError, match="is given twice"):
+            load(twice, **XU)
+
+
+def test_a_file_cut_while_it_is_read_is_one_sentence(tmp_path):
+    x = np.random.default_rng(0).normal(size=3_000_000)
+    path = columns(tmp_path, "a.parquet", x=x, u=x)
+    blocks = uc.open(path, **XU).blocks(100_000)
+    assert len(next(blocks)) == 100_000
+    os.truncate(path, 10_000)
+    with pytest.raises(DataError, match=r"a.parquet is damaged or not a Parquet file"):
+        list(blocks)
+
+
+def test_sizes_are_checked_before_memory_is_taken(tmp_path):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**15,)})
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("x.npy", header.getvalue())
+        archive.writestr("u.npy", header.getvalue())
+    with pytest.raises(DataError, match=r"a.npz is damaged: x.npy does not hold what it promises"):
+        load(path, **XU)
+    big = columns(tmp_path, "a.parquet", x=np.ones(100_000), u=np.ones(100_000))
+    recordings = uc.open(big, **XU)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("unconstrain.memory.available_memory", lambda: 1e6)
+        with pytest.raises(
+            DataError, match=r"a.parquet would take .* use fit_stream, or read them block by block"
+        ):
+            recordings.load()
+        assert sum(len(block) for block in recordings.blocks()) == 100_000
+
+
+def test_names_reach_no_terminal_as_they_are(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\x1b[31mx,u\n1,2\n3,oops\n")
+    with pytest.raises(DataError) as caught:
+        load(path, state=0, action="u")
+    assert str(caught.value).isprintable()
+    with pytest.raises(DataError) as caught:
+        load(path, state="y", action="u")
+    assert str(caught.value).isprintable()
+    path.write_text("\x1b[31mx,u\n1,2\n3,4\n")
+    assert repr(load(path, state=0, action="u")).isprintable()
+
+
+def test_files_of_a_folder_hold_columns_of_one_kind(tmp_path):
+    columns(tmp_path, "parts/a.parquet", x=ONES, u=ONES, e=[1, 1, 2], v=[[1.0, 2.0]] * 3)
+    columns(tmp_path, "parts/b.parquet", x=ONES, u=ONES, e=["1", "1", "2"], v=[[1.0, 2.0, 3.0]] * 3)
+    with pytest.raises(
+        DataError, match=r"b.parquet and the files beside it hold text and number values in column 'e'"
+    ):
+        load(tmp_path / "parts", **XU, episode="e")
+    with pytest.raises(DataError, match=r"b.parquet: 'v' holds lists that are missing or differ in length"):
+        load(tmp_path / "parts", state="v", action="u")
+
+
+def test_columns_and_options_are_given_once(tmp_path):
+    path = columns(tmp_path, "a.parquet", x=ONES, u=ONES)
+    opened = uc.open(
+        path, columns=uc.Columns(state="x", action="u"), preparation=uc.Preparation(min_speed=0.5)
+    )
+    assert len(opened.load()) == 3
+    assert uc.open(opened) is opened
+    for options, sentence in [
+        ({"columns": uc.Columns(state="x"), "action": "u"}, "give either columns= or action="),
+        ({"columns": {"state": "x"}}, "columns= must be a Columns"),
+        ({"preparation": uc.Preparation(), "window": 1.0}, "give either preparation= or window="),
+    ]:
+        with pytest.raises(DataError, match=sentence):
+            uc.open(path, **options)
+    with pytest.raises(DataError, match="are open already"):
+        uc.open(opened, state="x")
+    with pytest.raises(DataError, match="window= is about columns of files"):
+        uc.open([(np.ones((3, 1)), np.ones((3, 1)))], window=1.0)

@@ -13,6 +13,7 @@ import numpy as np
 from unconstrain import demonstrations_file
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
+from unconstrain.memory import check_memory
 from unconstrain.recordings.batches import FORMS, Batches
 from unconstrain.recordings.blocks import Loaded, Source
 from unconstrain.recordings.columns import Columns, Key, Keys
@@ -20,9 +21,8 @@ from unconstrain.recordings.files import File, Folder, label, locate, short_name
 from unconstrain.recordings.formats import lerobot, recognize
 from unconstrain.recordings.formats.base import Declared, Format
 from unconstrain.recordings.formats.lerobot import LeRobot
-from unconstrain.recordings.formats.npz import InMemory
 from unconstrain.recordings.formats.parquet import Parquet
-from unconstrain.recordings.memory import check_memory
+from unconstrain.recordings.formats.saved import InMemory
 from unconstrain.recordings.notes import Note, add_up, combine
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.recording import Recording, assign_roles

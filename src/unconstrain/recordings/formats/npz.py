@@ -1,7 +1,5 @@
 """NumPy archives: the names of the arrays are the columns, and an array (N, k) stands for its k columns."""
 
-import hashlib
-import json
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -11,12 +9,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from unconstrain import demonstrations_file
 from unconstrain.errors import DataError
+from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import ColumnKey, Declared, damage_named
-from unconstrain.recordings.formats.saved import declare
-from unconstrain.recordings.memory import check_memory
 from unconstrain.recordings.table import Column, Header, row
 
 Shape = tuple[int, ...]
@@ -52,11 +48,8 @@ class Npz:
         return self._header
 
     def declared(self) -> Declared | None:
-        """Return the roles of the arrays where this package wrote the file."""
-        if demonstrations_file.KEY not in self._arrays:
-            return None
-        (text,) = self._load([demonstrations_file.KEY])
-        return declare(str(text), self.file.shown) if text.shape == () else None
+        """Return nothing: an archive says nothing of its arrays but their names."""
+        return None
 
     @property
     def row_groups(self) -> tuple[int, ...]:
@@ -125,67 +118,6 @@ class Npz:
             zipfile.ZipFile(opened) as archive,
         ):
             return [_load_member(archive, f"{name}.npy") for name in names]
-
-
-class InMemory:
-    """Demonstrations that are in memory already, read as a file would be.
-
-    Parameters
-    ----------
-    arrays : mapping of str to array
-        As `demonstrations_file.arrays_of` gives them.
-    about : dict
-        As `demonstrations_file.describe` gives it.
-    """
-
-    suffixes: ClassVar[tuple[str, ...]] = ()
-    at_once: ClassVar[bool] = True
-
-    def __init__(self, arrays: Mapping[str, NDArray[Any]], about: dict[str, Any]) -> None:
-        self.file = File("these demonstrations", "demonstrations", None)
-        self._arrays, self._about = arrays, about
-
-    @classmethod
-    def matches(cls, file: File) -> bool:
-        """Whether a file is of this format: none is."""
-        return False
-
-    def columns(self) -> Header:
-        """Return the arrays (N,) and (N, k) as columns."""
-        shapes = {name: (array.dtype, array.shape) for name, array in self._arrays.items()}
-        return header_of(shapes, self.file.shown)
-
-    def declared(self) -> Declared | None:
-        """Return the roles of the arrays."""
-        return declare(json.dumps(self._about), self.file.shown)
-
-    @property
-    def row_groups(self) -> tuple[int, ...]:
-        """The number of samples."""
-        return (len(self._arrays["states"]),)
-
-    def read(
-        self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
-    ) -> Iterator[tuple[int, pa.RecordBatch]]:
-        """Read samples of these columns as one piece, with its first row."""
-        values = [to_arrow(self._arrays[name][start:stop]) for name, _ in columns]
-        yield start, pa.RecordBatch.from_arrays(values, names=[name for name, _ in columns])
-
-    def place(self, index: int) -> str:
-        """Say which sample it is."""
-        return row(index)
-
-    def in_one_thread(self) -> "InMemory":
-        """Return the same demonstrations."""
-        return self
-
-    def identity(self) -> str:
-        """Say what tells these demonstrations from others: a digest of the arrays."""
-        digest = hashlib.blake2b(digest_size=16)
-        for name, array in self._arrays.items():
-            digest.update(f"{name} {array.dtype} {array.shape}".encode())
-            digest.update(np.ascontiguousarray(array).data)
-        return digest.hexdigest()
 
 
 def header_of(arrays: Mapping[str, tuple[np.dtype, Shape]], shown: str) -> Header:

@@ -1,5 +1,6 @@
 """Parquet files: flat columns, and lists of one length, as LeRobot's `observation.state`."""
 
+import json
 from collections.abc import Iterator, Sequence
 from copy import copy
 from functools import cached_property
@@ -51,7 +52,11 @@ class Parquet:
     def declared(self) -> Declared | None:
         """Return the roles of the columns where this package wrote the file."""
         text = self._metadata.get(demonstrations_file.KEY.encode())
-        return None if text is None else declare(text, self.file.shown)
+        if text is None:
+            return None
+        with damage_named(self.file.shown, "saved demonstrations"):
+            about = json.loads(text)
+        return declare(about, self.file.shown)
 
     @property
     def row_groups(self) -> tuple[int, ...]:

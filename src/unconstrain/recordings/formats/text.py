@@ -12,9 +12,9 @@ import pyarrow.compute as pc
 import pyarrow.csv
 
 from unconstrain.errors import DataError
+from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import ColumnKey, Declared
-from unconstrain.recordings.memory import check_memory
 from unconstrain.recordings.table import Column, Header
 
 BOM = b"\xef\xbb\xbf"

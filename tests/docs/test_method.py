@@ -9,6 +9,7 @@ import numpy as np
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -19,7 +20,7 @@ def rows(text):
 
 
 def test_both_pages_state_what_the_code_prints():
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    _, code = BLOCKS
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         exec(code, {})
@@ -37,3 +38,9 @@ def test_both_pages_state_what_the_code_prints():
     assert [[float(cell) for cell in row] for row in cells] == [
         a + b for a, b in zip(constrained, free, strict=True)
     ]
+
+
+def test_a_feature_map_of_ones_own_finds_the_parameters():
+    names = {}
+    exec(BLOCKS[0], names)
+    np.testing.assert_allclose(names["policy"].solution_.w, [0.5, 1.0, -1.0], atol=1e-6)

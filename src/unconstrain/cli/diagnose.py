@@ -10,7 +10,7 @@ from unconstrain.cli.declared import Number
 from unconstrain.errors import PolicyError
 from unconstrain.progress import working
 
-THRESHOLD = 0.01
+THRESHOLD = 1e-3  # of `diagnostics.spectrum`, which is not imported before it is needed
 
 
 @command(

@@ -24,19 +24,19 @@ class Demonstrations:
 
     Parameters
     ----------
-    states : array (N, n)
+    states : array_like of shape (N, n)
         Where the system was.
-    actions : array (N, d)
+    actions : array_like of shape (N, d)
         What was done, u = N(x) π(x): the constrained action, as recorded or differentiated.
-    episodes : array (N,), optional
+    episodes : array_like of shape (N,), optional
         One value per sample. With `episode_labels`: integer codes into it. Without: any integers or
         strings, which are sorted, numbered and kept as labels. Default: a single episode.
-    time : array (N,), optional
+    time : array_like of shape (N,), optional
         Seconds. `load` counts them from the first stamp of each episode as it was recorded; a fragment
         of an episode that was split keeps its place in it.
-    policy : array (N, d), optional
+    policy : array_like of shape (N, d), optional
         The true unconstrained action π(x), known only in simulation.
-    projections : array (N, d, d), optional
+    projections : array_like of shape (N, d, d), optional
         What is known of the nullspace projections N(x); in simulation, the true ones. All NaN where not known.
     state_names, action_names : sequence of str, optional
         Default x1, x2, ... and u1, u2, ...
@@ -44,16 +44,16 @@ class Demonstrations:
         One per episode, each used.
     notes : sequence of str, optional
         What a user of the data should know of its reading, a sentence each.
-    forces : array (N, m), optional
+    forces : array_like of shape (N, m), optional
         Measured contact forces; see `constraints.from_recording`.
-    free : array (N,), optional
+    free : array_like of shape (N,), optional
         1 where the demonstrator says that nothing constrained the motion, else 0.
 
     Attributes
     ----------
-    states, actions, time, policy, projections, forces, free : array
+    states, actions, time, policy, projections, forces, free : ndarray
         As above, float64.
-    episodes : array (N,) of int64
+    episodes : ndarray of shape (N,), int64
         Codes 0 .. n_episodes - 1, fit to be passed as `groups=`.
     state_names, action_names, episode_labels, notes : tuple of str
         As above.
@@ -130,7 +130,7 @@ class Demonstrations:
 
         Parameters
         ----------
-        samples : array (N,) of bool, array of int, or slice
+        samples : array_like of shape (N,), bool or int, or slice
             Which ones.
 
         Returns
@@ -204,7 +204,7 @@ class Demonstrations:
 
         Returns
         -------
-        array (N,)
+        ndarray of shape (N,)
             Labels, ``k * episode + block``.
 
         Raises
@@ -233,7 +233,7 @@ class Demonstrations:
 
         Returns
         -------
-        array (N,)
+        ndarray of shape (N,)
             Labels, to be passed as `groups=`.
 
         Raises

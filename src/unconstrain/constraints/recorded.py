@@ -34,7 +34,7 @@ def from_recording(
 
     Returns
     -------
-    array (N, d, d)
+    ndarray of shape (N, d, d)
         NaN where nothing is known.
 
     Raises
@@ -76,18 +76,18 @@ def from_forces_and_flags(
 
     Parameters
     ----------
-    forces : array (N, m) or None
-    free : array (N,) or None
+    forces : ndarray of shape (N, m) or None
+    free : ndarray of shape (N,) or None
         Not None where there are no forces.
-    actions : array (N, d)
-    episodes : array (N,)
+    actions : ndarray of shape (N, d)
+    episodes : ndarray of shape (N,)
         Forces are filtered within each.
     force_threshold, release, window, margin, jacobian : optional
         See `from_forces`.
 
     Returns
     -------
-    array (N, d, d)
+    ndarray of shape (N, d, d)
         NaN where nothing is known.
 
     Raises
@@ -127,7 +127,7 @@ def describe_known(projections: NDArray[np.float64]) -> str:
 
     Parameters
     ----------
-    projections : array (N, d, d)
+    projections : ndarray of shape (N, d, d)
         All NaN where nothing is known.
 
     Returns

@@ -57,10 +57,10 @@ class Loaded:
     motion : Motion or None
     episodes : tuple of Episode
         Where the samples are to become demonstrations; so are all that follow.
-    time : array (N,) or None
-    policy : array (N, d) or None
-    forces : array (N, m) or None
-    free : array (N,) or None
+    time : ndarray of shape (N,) or None
+    policy : ndarray of shape (N, d) or None
+    forces : ndarray of shape (N, m) or None
+    free : ndarray of shape (N,) or None
     """
 
     samples: Samples
@@ -200,11 +200,11 @@ def number_values(values: NDArray[Any]) -> tuple[NDArray[np.int64], list[Any]]:
 
     Parameters
     ----------
-    values : array (N,)
+    values : ndarray of shape (N,)
 
     Returns
     -------
-    array (N,)
+    ndarray of shape (N,)
         Numbers from 0.
     list
         The value of each number.

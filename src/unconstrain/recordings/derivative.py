@@ -23,9 +23,9 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
 
     Parameters
     ----------
-    states : array (N, n)
+    states : array_like of shape (N, n)
         The states of one episode.
-    time : array (N,)
+    time : array_like of shape (N,)
         Seconds, strictly increasing.
     window : float
         Seconds from a window's first to its last sample, rounded to an odd number of samples and never
@@ -35,7 +35,7 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
 
     Returns
     -------
-    array (N, n)
+    ndarray of shape (N, n)
         dx/dt, in [units of the states] / s.
 
     Raises

@@ -23,9 +23,9 @@ class Fragments:
 
     Parameters
     ----------
-    samples : array (M,)
+    samples : ndarray of shape (M,)
         Indices of the samples kept, in the recording's order.
-    episodes : array (M,)
+    episodes : ndarray of shape (M,)
         The fragment of each, as a number from 0.
     origins : tuple of (int, int)
         Of each fragment, the episode it is from, and which of that episode's fragments it is, counted from 1; 0 where
@@ -61,10 +61,10 @@ def split(
 
     Parameters
     ----------
-    states : array (N, n)
-    time : array (N,)
+    states : ndarray of shape (N, n)
+    time : ndarray of shape (N,)
         Seconds, strictly increasing within an episode.
-    episodes : array (N,)
+    episodes : ndarray of shape (N,)
         Numbers from 0, each used; episodes may be interleaved.
     gap : float or None
         Seconds; None for five times an episode's median step.

@@ -85,7 +85,7 @@ def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) ->
 
     Returns
     -------
-    array (k, N)
+    ndarray of shape (k, N)
         A row a field, as columns are stored: float32 where the files hold nothing else, half of what is moved about
         then; float64 otherwise.
 
@@ -146,7 +146,7 @@ def read_projections(
 
     Returns
     -------
-    array (N, d, d)
+    ndarray of shape (N, d, d)
 
     Raises
     ------

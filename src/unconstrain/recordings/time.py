@@ -50,7 +50,7 @@ class Clock:
         Parameters
         ----------
         stamps : Cells
-        episodes : array (N,)
+        episodes : ndarray of shape (N,)
             The episode of each stamp, as a number from 0.
         unit : {"s", "ms", "us", "ns"}, optional
 
@@ -93,8 +93,8 @@ class Clock:
 
         Parameters
         ----------
-        ticks : array (N,)
-        episodes : array (N,)
+        ticks : ndarray of shape (N,)
+        episodes : ndarray of shape (N,)
             The episode of each stamp, as a number from 0.
         path, called : str
             The file and the column, as a sentence says them.
@@ -103,7 +103,7 @@ class Clock:
 
         Returns
         -------
-        array (N,)
+        ndarray of shape (N,)
 
         Raises
         ------

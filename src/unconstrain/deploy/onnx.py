@@ -14,7 +14,6 @@ The exponents are `e_i = (c_i - m)ᵀ(x - m) / σ² - ‖c_i - m‖² / 2σ²`, 
 product, and nothing overflows far from all centres.
 """
 
-from importlib.metadata import version
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -24,6 +23,7 @@ from numpy.typing import ArrayLike
 from unconstrain import atomic
 from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.errors import PolicyError
+from unconstrain.version import __version__
 
 if TYPE_CHECKING:
     from onnx import ModelProto
@@ -161,7 +161,7 @@ class Graph:
             opset_imports=[helper.make_opsetid("", OPSET)],
             ir_version=IR_VERSION,
             producer_name="unconstrain",
-            producer_version=version("unconstrain"),
+            producer_version=__version__,
         )
 
 

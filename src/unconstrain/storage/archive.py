@@ -15,7 +15,6 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
-from importlib.metadata import version
 from io import BufferedIOBase
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
@@ -23,6 +22,7 @@ from typing import IO, TYPE_CHECKING, Any, cast
 from unconstrain import atomic
 from unconstrain.errors import ArchiveError, DataError, UnconstrainError
 from unconstrain.memory import check_memory
+from unconstrain.version import __version__
 
 if TYPE_CHECKING:
     import numpy as np
@@ -122,7 +122,7 @@ def write(path: FilePath, kind: Kind, tree: Any, arrays: Mapping[str, "np.ndarra
     """
     import numpy as np
 
-    about = {"kind": str(kind), "layout": LAYOUT, "release": version("unconstrain"), "tree": tree}
+    about = {"kind": str(kind), "layout": LAYOUT, "release": __version__, "tree": tree}
     note = json.dumps(about, allow_nan=False).encode()
     if len(note) > LARGEST_NOTE:
         raise UnconstrainError(
@@ -315,7 +315,7 @@ def _about(
     if about["layout"] > LAYOUT:
         raise ArchiveError(
             f"{os.fspath(path)} was written by unconstrain {about.get('release')!s:.40}, in a newer layout than this "
-            f"release ({version('unconstrain')}) reads: upgrade unconstrain"
+            f"release ({__version__}) reads: upgrade unconstrain"
         )
     if about.get("kind") not in list(Kind):
         raise _Damage(f"it is of no known kind, {about.get('kind')!r:.40}")

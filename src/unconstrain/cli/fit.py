@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from unconstrain.comparison import Comparison
     from unconstrain.demonstrations import Demonstrations
     from unconstrain.policies.base import Policy
+    from unconstrain.recordings import Recordings
     from unconstrain.selection import Row
 
 WORTH_A_WARNING = 0.1
@@ -62,8 +63,9 @@ def fit(
 ) -> None:
     """Learn the unconstrained policy behind recordings, and save it.
 
-    FILES are recordings in CSV, NPZ or Parquet files, folders of Parquet files, or LeRobot datasets. Folders, URIs such
-    as s3://bucket/folder, and whatever is read with --checkpoint or --cluster need not fit into memory.
+    FILES are recordings in CSV, NPZ or Parquet files, folders of Parquet files, or LeRobot datasets, here or at URIs
+    such as s3://bucket/folder. What does not fit into memory, and what has a --checkpoint or a --cluster, is read as a
+    stream: without a comparison with ordinary regression.
     """
     outputs.check_outputs(
         recorded.files,
@@ -80,18 +82,22 @@ def fit(
         raise PolicyError("a cluster makes up for workers it loses: leave out checkpoint= or cluster=")
     needs_memory = {"--model auto": model.is_chosen, "figure=": figure, "folds=": folds}
     named = [option for option, given in needs_memory.items() if given]
-    if checkpoint is not None or cluster is not None or (recorded.is_large and not named):
-        if named:
-            raise PolicyError(f"{named[0]} needs all data in memory, and a stream is read once: leave it out")
+    is_stream = checkpoint is not None or cluster is not None
+    if is_stream and named:
+        raise PolicyError(f"{named[0]} needs all data in memory, and a stream is read once: leave it out")
+    with working("reading"):
+        opened = recorded.open()
+        demos = opened.load() if named or (not is_stream and opened.fits_in_memory) else None
+    if demos is None:
         from unconstrain.scaling.summary import describe_fit
 
-        policy = _fit_stream(recorded, model, checkpoint, cluster)
+        policy = _fit_stream(opened, model, checkpoint, cluster)
+        policy.recording_ = recorded.kept()
         policy.save(out, resumable=resumable)
         reporting.say(describe_fit(policy))
+        recordings.describe_notes(opened.notes)
         _suggest(out)
         return
-    with working("reading"):
-        demos = recorded.load()
     recordings.describe(demos)
     comparison = _compare(demos, model, folds)
     policy = comparison.policy
@@ -174,17 +180,12 @@ def _suggest(out: Path, demos: "Demonstrations | None" = None) -> None:
 
 
 def _fit_stream(
-    recorded: recordings.Recorded, model: models.Model, checkpoint: Path | None, cluster: str | None
+    opened: "Recordings", model: models.Model, checkpoint: Path | None, cluster: str | None
 ) -> "Policy":
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
 
-    policy, opened = model.build(), recorded.open()
     if cluster is None:
-        fit_stream(policy, opened, checkpoint=checkpoint, progress=True)
-    else:
-        with distributed.connected(cluster) as client:
-            distributed.fit(policy, opened, client, progress=True)
-    recordings.describe_notes(opened.notes)
-    policy.recording_ = recorded.kept()
-    return policy
+        return fit_stream(model.build(), opened, checkpoint=checkpoint, progress=True)
+    with distributed.connected(cluster) as client:
+        return distributed.fit(model.build(), opened, client, progress=True)

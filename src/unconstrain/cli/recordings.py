@@ -1,6 +1,5 @@
 """Which recordings a command reads, and how: options that all commands share."""
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -41,11 +40,6 @@ class Recorded:
     columns: Columns
     preparation: Preparation
     given: frozenset[str]
-
-    @property
-    def is_large(self) -> bool:
-        """Whether these may be more than fits into memory: a folder, or something remote."""
-        return any("://" in name or os.path.isdir(os.path.expanduser(name)) for name in self.files)
 
     @property
     def tells_constraints(self) -> bool:

@@ -10,18 +10,22 @@ import numpy as np
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.memory import check_memory
+from unconstrain.memory import available_memory, check_memory
 from unconstrain.recordings.batches import Batches
 from unconstrain.recordings.blocks import Loaded, Source
 from unconstrain.recordings.columns import Columns, Key, Keys
 from unconstrain.recordings.notes import Note, add_up, combine
 from unconstrain.recordings.opening import check_plain, open_demonstrations, open_files, tell_apart
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.tables import Tables
 from unconstrain.samples import Samples
 
 BATCH_ROWS = 2**16
 """Rows in a block, unless another number is asked for."""
+
+WHILE_LEARNING = 8
+"""How many times the memory of what is loaded a fit to all of it at once may take, with what it is compared with."""
 
 Arguments = ParamSpec("Arguments")
 
@@ -75,6 +79,12 @@ class Recordings:
     def n_rows(self) -> int | None:
         """The number of rows in the files; None where it is not known."""
         return self.source.n_rows
+
+    @property
+    def fits_in_memory(self) -> bool:
+        """Whether all of it may be loaded and learnt from at once, rather than in one pass by `fit_stream`."""
+        left = available_memory()
+        return left is None or WHILE_LEARNING * self._loaded_bytes < left
 
     def load(self) -> Demonstrations:
         """Read all recordings into memory.
@@ -187,14 +197,22 @@ class Recordings:
         )
 
     def _check_memory(self) -> None:
-        if not isinstance(self.source, Tables):
-            return
-        pieces = [each for each in self.source.recordings if not any(file.at_once for file in each.files)]
-        numbers = sum(each.n_rows * (len(each.roles.state) + 2 * each.roles.n_actions) for each in pieces)
-        what = " and ".join(each.shown for each in pieces[:1]) + (
-            f" and {len(pieces) - 1} more" if pieces[1:] else ""
+        pieces = [each.shown for each in self._in_pieces]
+        what = " and ".join(pieces[:1]) + (f" and {len(pieces) - 1} more" if pieces[1:] else "")
+        check_memory(self._loaded_bytes, f"loading {what}", "use fit_stream, or read them block by block")
+
+    @property
+    def _in_pieces(self) -> list[Recording]:
+        """The recordings that need not be read as a whole, whose size is known before."""
+        every = self.source.recordings if isinstance(self.source, Tables) else ()
+        return [each for each in every if not any(file.at_once for file in each.files)]
+
+    @property
+    def _loaded_bytes(self) -> float:
+        numbers = (
+            each.n_rows * (len(each.roles.state) + 2 * each.roles.n_actions) for each in self._in_pieces
         )
-        check_memory(8.0 * numbers, f"loading {what}", "use fit_stream, or read them block by block")
+        return 8.0 * sum(numbers)
 
     def _assemble(self, several: list[Loaded], labels: "_Labels", notes: tuple[Note, ...]) -> Demonstrations:
         """Make demonstrations of samples; `labels` are those of the episodes met so far in this pass."""

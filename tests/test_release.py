@@ -1,6 +1,7 @@
 """The version and the day of its release are said in several files, and are the same in all of them."""
 
 import re
+from importlib import metadata
 from pathlib import Path
 
 import unconstrain

@@ -155,7 +155,8 @@ def test_the_file_is_what_the_documentation_says(name, tmp_path):
         about = json.loads(archive["unconstrain.json"])
         kind = about["tree"]["kind"]
         assert about == {
-            "kind": "compiled policy", "layout": 1, "release": uc.__version__, "tree": {"kind": STEPS[name].kind},
+            "kind": "compiled policy", "layout": 1, "release": uc.__version__, "arrays": list(KINDS[kind].layout),
+            "tree": {"kind": STEPS[name].kind},
         }  # fmt: skip
         assert set(archive.files) == {"unconstrain.json", *KINDS[kind].layout}
         assert all(archive[each].dtype == np.float64 for each in KINDS[kind].layout)

@@ -145,7 +145,9 @@ def test_bytes_changed_anywhere_are_told_or_harmless(saved, data):
 
 def rewrite(path, note=None, members=(), compression=zipfile.ZIP_STORED):
     """A file that begins as ours, with another note or other members, made by someone who knows the format."""
-    given = {"kind": "policy", "layout": 1, "release": "0.1.0", "tree": None} if note is None else note
+    names = [name.removesuffix(".npy") for name, _ in members]
+    plain = {"kind": "policy", "layout": 1, "release": "0.1.0", "arrays": names, "tree": None}
+    given = plain if note is None else note
     text = given if isinstance(given, bytes) else json.dumps(given).encode()
     with zipfile.ZipFile(path, "w", compression) as crafted:
         crafted.writestr(zipfile.ZipInfo("unconstrain.json"), text)
@@ -246,12 +248,15 @@ def test_crafted_members_are_refused(members, sentence, tmp_path, monkeypatch):
         b'{"layout": 1, "kind": "policy", "tree": Infinity}',
         b'{"layout": 1, "kind": "policy", "tree": ' + b"9" * 10_000 + b"}",
         {"layout": 1, "kind": "policy"},
-        {"layout": True, "kind": "policy", "tree": 1},
-        {"layout": "1", "kind": "policy", "tree": 1},
-        {"layout": 1, "kind": ["policy"], "tree": 1},
-        {"layout": 1, "kind": {"policy": 1}, "tree": 1},
-        {"layout": 1, "kind": "mind", "tree": 1},
-        {"layout": -1, "kind": None, "tree": 1},
+        {"layout": True, "kind": "policy", "arrays": [], "tree": 1},
+        {"layout": "1", "kind": "policy", "arrays": [], "tree": 1},
+        {"layout": 1, "kind": ["policy"], "arrays": [], "tree": 1},
+        {"layout": 1, "kind": {"policy": 1}, "arrays": [], "tree": 1},
+        {"layout": 1, "kind": "mind", "arrays": [], "tree": 1},
+        {"layout": -1, "kind": None, "arrays": [], "tree": 1},
+        {"layout": 1, "kind": "policy", "tree": 1},
+        {"layout": 1, "kind": "policy", "arrays": [1], "tree": 1},
+        {"layout": 1, "kind": "policy", "arrays": ["a"], "tree": 1},
     ],
 )
 def test_crafted_notes_are_refused(note, tmp_path):

@@ -122,7 +122,9 @@ def write(path: FilePath, kind: Kind, tree: Any, arrays: Mapping[str, "np.ndarra
     """
     import numpy as np
 
-    about = {"kind": str(kind), "layout": LAYOUT, "release": __version__, "tree": tree}
+    about = {
+        "kind": str(kind), "layout": LAYOUT, "release": __version__, "arrays": list(arrays), "tree": tree,
+    }  # fmt: skip
     note = json.dumps(about, allow_nan=False).encode()
     if len(note) > LARGEST_NOTE:
         raise UnconstrainError(
@@ -186,6 +188,9 @@ def read(path: FilePath, kind: Kind) -> tuple[Any, dict[str, "np.ndarray"]]:
             raise ArchiveError(
                 f"{os.fspath(path)} holds {found.described}, not {kind.described}: {found.use}"
             )
+        listed = {NOTE, *(f"{name}.npy" for name in about["arrays"])}
+        if listed != set(members):
+            raise _Damage("it does not hold the arrays that it lists")
         size = sum(member.file_size for member in members.values())
         check_memory(size, f"reading {os.fspath(path)}", "read it on a machine that has more")
         arrays = {
@@ -317,6 +322,9 @@ def _about(
             f"{os.fspath(path)} was written by unconstrain {about.get('release')!s:.40}, in a newer layout than this "
             f"release ({__version__}) reads: upgrade unconstrain"
         )
+    names = about.get("arrays")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise _Damage(f"its {NOTE} does not list its arrays")
     if about.get("kind") not in list(Kind):
         raise _Damage(f"it is of no known kind, {about.get('kind')!r:.40}")
     return about

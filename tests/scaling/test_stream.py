@@ -502,3 +502,15 @@ def test_an_episode_that_comes_back_cannot_be_differentiated(tmp_path):
             uc.open(folder, **COLUMNS | {"action": None, "time": "timestamp"}),
             batch_rows=50,
         )
+
+
+def test_one_episode_is_refused_before_the_pass(tmp_path):
+    folder = written.write(tmp_path / "parts", X, U, np.zeros(len(X), dtype=int), TIME, [200])
+    told = []
+    with pytest.raises(uc.errors.DataError, match="at least two episodes"):
+        uc.fit_stream(
+            uc.ParametricPolicy(),
+            uc.open(folder, **COLUMNS),
+            progress=lambda done, of: told.append(done),
+        )
+    assert told == []

@@ -6,12 +6,15 @@ import os
 import re
 import stat
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
-from typing import Any
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import Any, TypeVar
 
 import pyarrow as pa
 import pyarrow.fs
@@ -25,6 +28,11 @@ PARQUET = (".parquet", ".pq")
 
 PROBED = 65_536
 """Bytes at either end of a file by which it is told from another."""
+
+ANSWER_SECONDS = 30.0
+"""How long an object store may take to answer for the first time."""
+
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -225,9 +233,12 @@ def _local(shown: str) -> File | Folder:
 
 
 def _remote(uri: str) -> File | Folder:
-    try:
+    def ask() -> tuple[Any, str, Any]:
         filesystem, path = pyarrow.fs.FileSystem.from_uri(uri)
-        info = filesystem.get_file_info(path)
+        return filesystem, path, filesystem.get_file_info(path)
+
+    try:
+        filesystem, path, info = _wait_for(uri, ask)
     except (OSError, pa.ArrowException) as error:
         raise DataError(f"{uri} cannot be opened ({(str(error).splitlines() or ['?'])[0]})") from error
     if info.type == pyarrow.fs.FileType.NotFound:
@@ -237,6 +248,29 @@ def _remote(uri: str) -> File | Folder:
     if info.type != pyarrow.fs.FileType.File:
         raise DataError(f"{uri} is a pipe or a device and not a file: write its content to a file first")
     return File(uri, path, filesystem)
+
+
+def _wait_for(uri: str, ask: Callable[[], Answer]) -> Answer:
+    """Ask an object store something, which may try for ever to reach it."""
+    answers: SimpleQueue[Future[Answer]] = SimpleQueue()
+
+    def work() -> None:
+        answer: Future[Answer] = Future()
+        try:
+            answer.set_result(ask())
+        except Exception as error:
+            answer.set_exception(error)
+        answers.put(answer)
+
+    # Not a pool: at the end of the program one would wait for its threads.
+    Thread(target=work, daemon=True).start()
+    try:
+        return answers.get(timeout=ANSWER_SECONDS).result()
+    except Empty:
+        raise DataError(
+            f"{uri} did not answer within {ANSWER_SECONDS:g} s: check the address, and whether this machine "
+            "can reach it"
+        ) from None
 
 
 def _check_apart(found: list[File | Folder]) -> None:

@@ -21,7 +21,16 @@ from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.source import BATCH_ROWS, Openable
 from unconstrain.recordings.tables import Tables
 from unconstrain.scaling.connection import as_finished, connected
-from unconstrain.scaling.stream import SAMPLE_ROWS, PolicyT, begin, deal, finish, open_for, to_learn_from
+from unconstrain.scaling.stream import (
+    SAMPLE_ROWS,
+    PolicyT,
+    begin,
+    check_episodes,
+    deal,
+    finish,
+    open_for,
+    to_learn_from,
+)
 
 __all__ = ["connected", "fit"]
 
@@ -101,6 +110,7 @@ def fit(
     source = opened.source
     if not isinstance(source, Tables):
         raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
+    check_episodes(policy, source, partial=partial)
     accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
     rows = part_rows or max(batch_rows, -(-source.n_rows // (PARTS_PER_THREAD * threads)))

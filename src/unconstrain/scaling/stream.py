@@ -23,6 +23,7 @@ from unconstrain import atomic
 from unconstrain.arrays import check_samples
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.solve import ONE_FOLD
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
 from unconstrain.progress import Report, reporting
@@ -106,6 +107,7 @@ def fit_stream(
         resumed = checkpoints.load(checkpoint, belongs_to, policy)
         atomic.check_writable(checkpoint)
     if resumed is None:
+        check_episodes(policy, source, partial=partial)
         resumed = Progress(begin(policy, source, sample_rows, random_state, partial=partial), Sums(), 0)
 
     def keep(reached: Progress) -> None:
@@ -151,6 +153,27 @@ def open_for(
     if opened.source.knows_projections and policy.risk == "direct":
         raise PolicyError('projections are for risk="inconsistency", and this policy has risk="direct"')
     return opened
+
+
+def check_episodes(policy: Policy, source: Source, *, partial: bool) -> None:
+    """Find out before a long pass that there is one episode, where λ is to be chosen on held-out ones.
+
+    Nothing but the episode column is read, and no further than to the second episode.
+
+    Raises
+    ------
+    DataError
+        All rows of the files are one episode. Of what is split on the way, or is no file, that is not known yet.
+    """
+    goes_on = partial and hasattr(policy, "model_")
+    if policy.alpha != "cv" or goes_on or source.row_groups is None or source.relabels or not source.n_rows:
+        return
+    first: Any = None
+    for labels, start in source.labels(0, source.n_rows):
+        first = labels[0] if start == 0 else first
+        if np.any(labels != first):
+            return
+    raise DataError(ONE_FOLD)
 
 
 def begin(

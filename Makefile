@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench reproduce format clean
+.PHONY: demo test fuzz bench reproduce format clean
 
 demo: $(VENV)/.demo
 	$(BIN)/unconstrain demo --out out/demo --overwrite
@@ -14,6 +14,11 @@ test: $(VENV)/.test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2
+
+# Any number of inputs that nobody meant to give; those that fail are kept in out/fuzz.
+N ?= 1000
+fuzz: $(VENV)/.test
+	$(BIN)/python -m tests.fuzz --number $(N) $(if $(SEED),--seed $(SEED))
 
 # The two variables, where they are set, tell OpenBLAS to behave as on another machine than this.
 bench: $(VENV)/.test

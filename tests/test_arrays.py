@@ -104,3 +104,43 @@ def test_the_place_of_a_mistake_can_be_asked_for_also_after_a_process_has_sent_i
     sent = pickle.loads(pickle.dumps(caught.value))
     assert (sent.row, sent.column, str(sent)) == (1, 1, str(caught.value))
     assert uc.errors.DataError("no array").row is None
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: uc.ParametricPolicy().fit({}, X), "X|float"),
+        (lambda: uc.ParametricPolicy().fit(X, -1.0), "1 dimension"),
+        (lambda: uc.ParametricPolicy().fit(X + 1j, X), "Complex data not supported$"),
+        (lambda: uc.ParametricPolicy().fit(X, X, sample_weight=slice(3)), "slice"),
+        (
+            lambda: uc.ParametricPolicy().fit(X, X, groups=[[1], [1, 2]]),
+            "groups must hold one label a sample",
+        ),
+        (
+            lambda: uc.ParametricPolicy().fit(X, X, groups=[1, "a", {}] * 100),
+            "cannot be compared with each other",
+        ),
+        (lambda: uc.LocallyLinearPolicy(n_centers=10**400, centers="grid").fit(X, X), "memory"),
+        (lambda: uc.LocallyLinearPolicy(centers={1}).fit(X, X), "centers must be an array of numbers"),
+        (lambda: uc.LocallyLinearPolicy(coverage="x", n_centers=3).fit(X, X), "coverage must be a number"),
+        (lambda: uc.LocallyLinearPolicy(centers=[[1e6] * 3], width=1.0).fit(X, X), "far from all centres"),
+        (lambda: uc.NormalizedRBF(3, random_state="x").fit(X), "random_state must be a whole number"),
+        (lambda: uc.constraints.unconstrained(-1), "d must be a whole number of at least 1"),
+        (lambda: uc.constraints.unconstrained(10**9), "memory"),
+        (lambda: uc.constraints.from_jacobian(np.ones((2, 1, 3)), rows=1.5), "there is no row 1.5"),
+        (lambda: uc.constraints.from_forces(X, 0.5, margin="a"), "margin must be a whole number"),
+        (lambda: uc.constraints.contact(X, 0.5, release="a"), "release must be above zero"),
+        (lambda: uc.constraints.from_forces(X, 0.5, actions=X[None]), "actions must be"),
+        (lambda: uc.metrics.normalized(None, X), "the error must be a number"),
+        (lambda: FITTED.save(3.5), "is no path of a file"),
+        (lambda: FITTED.save("~nobody-of-that-name/x"), "is no path of a file"),
+        (lambda: FITTED.to_onnx(None), "None is no path of a file"),
+        (lambda: uc.load_policy(3.5), "is no path of a file"),
+    ],
+)
+def test_values_of_another_kind_are_told_in_one_sentence(call, sentence):
+    with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 400

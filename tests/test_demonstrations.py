@@ -128,7 +128,7 @@ def test_blocks_are_contiguous_and_even_within_each_episode(episodes, k):
 
 
 def test_blocks_need_a_positive_integer():
-    with pytest.raises(DataError, match="positive integer"):
+    with pytest.raises(UnconstrainError, match="k must be a whole number from 1"):
         simulated().blocks(0)
 
 
@@ -139,9 +139,9 @@ def test_moving_leaves_slow_samples_out_and_says_so():
     assert moving.episode_labels == ("b",)
     assert moving.notes == ("left out 2 of 4 samples slower than 1",)
     assert demos.moving(0) is demos
-    with pytest.raises(DataError, match="the fastest action has speed 2"):
+    with pytest.raises(UnconstrainError, match="the fastest action has speed 2"):
         demos.moving(3)
-    with pytest.raises(DataError, match="not below zero"):
+    with pytest.raises(UnconstrainError, match="min_speed must be a finite number of at least zero"):
         demos.moving(-1)
 
 
@@ -198,3 +198,36 @@ def test_a_missing_pandas_is_one_sentence(monkeypatch):
         UnconstrainError, match="to_pandas needs pandas, which is not installed: pip install pandas"
     ):
         Demonstrations([[1.0]], [[1.0]]).to_pandas()
+
+
+THREE = Demonstrations(np.ones((3, 2)), np.ones((3, 2)))
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: Demonstrations(np.ones((3, 2)) + 1j, np.ones((3, 2))), "states must be real numbers"),
+        (lambda: Demonstrations(np.ones((3, 2)), np.ones((3, 2)), [[1], [1, 2], 3]), "integers or strings"),
+        (lambda: Demonstrations(np.ones((3, 2)), np.ones((3, 2)), state_names=2), "state_names must be"),
+        (
+            lambda: Demonstrations(np.ones((3, 2)), np.ones((3, 2)), state_names=np.array(2)),
+            "state_names must be",
+        ),
+        (
+            lambda: Demonstrations(np.ones((3, 2)), np.ones((3, 2)), episode_labels=4),
+            "episode_labels must be",
+        ),
+        (lambda: Demonstrations(np.ones((3, 2)), np.ones((3, 2)), notes=4), "notes must be a list"),
+        (lambda: THREE.episode(0.5), r"no episode 0\.5"),
+        (lambda: THREE.episode([0]), r"no episode \[0\]"),
+        (lambda: THREE.blocks(10**30), "k must be a whole number from 1 to"),
+        (lambda: THREE.folds([1]), "folds must be episodes or blocks"),
+        (lambda: THREE.folds(0), "folds must be episodes or blocks, got 0"),
+        (lambda: THREE.moving("fast"), "min_speed must be a number of at least zero"),
+        (lambda: THREE.select([[1], [1, 2]]), "select takes"),
+    ],
+)
+def test_values_of_another_kind_are_told_in_one_sentence(call, sentence):
+    with pytest.raises(UnconstrainError, match=sentence) as caught:
+        call()
+    assert "\n" not in str(caught.value)

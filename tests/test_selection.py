@@ -170,7 +170,7 @@ def test_default_candidates_can_be_solved_in_seconds_whatever_the_dimension(n, d
         (lambda: uc.select_policy("auto", X, U[:3]), "inconsistent numbers"),
         (lambda: uc.select_policy("auto", X, 0 * U), "all actions are zero"),
         (lambda: uc.select_policy("auto", X, U, np.zeros(len(X))), "at least two episodes"),
-        (lambda: uc.select_policy("auto", X, U, [1, 2]), "one episode label a sample"),
+        (lambda: uc.select_policy("auto", X, U, [1, 2]), "one label a sample"),
         (
             lambda: uc.select_policy([uc.ParametricPolicy(uc.DecoupledFeatures())], X, U[:, 0]),
             "^DecoupledFeatures needs as many actions",

@@ -5,14 +5,14 @@ names what it reports only in passing, such as the row that holds a NaN. scikit-
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.errors import DataError, PolicyError
+from unconstrain.errors import DataError, NotNumbersError, PolicyError
 
 if TYPE_CHECKING:
     from sklearn.base import BaseEstimator
@@ -315,7 +315,7 @@ def check_weights(sample_weight: ArrayLike | None, X: np.ndarray) -> np.ndarray:
     return weights
 
 
-def check_groups(groups: ArrayLike | None, n_samples: int) -> np.ndarray | None:
+def check_groups(groups: ArrayLike | None, n_samples: int, name: str = "groups") -> np.ndarray | None:
     """Check episode labels.
 
     Parameters
@@ -324,6 +324,8 @@ def check_groups(groups: ArrayLike | None, n_samples: int) -> np.ndarray | None:
         A label a sample, numbers or text.
     n_samples : int
         N.
+    name : str
+        What the labels are, to begin the sentence of an error with.
 
     Returns
     -------
@@ -337,15 +339,24 @@ def check_groups(groups: ArrayLike | None, n_samples: int) -> np.ndarray | None:
     """
     if groups is None:
         return None
-    labels = np.asarray(groups)
+    try:
+        labels = np.asarray(groups)
+    except ValueError:  # rows of different lengths
+        labels = np.asarray(None)
     if labels.shape != (n_samples,):
+        shape = f", got shape {labels.shape}" if labels.ndim else ""
+        raise DataError(f"{name} must hold one label a sample, {n_samples} in all{shape}")
+    if labels.dtype.kind in "fc" and np.isnan(labels).any():
         raise DataError(
-            f"groups must hold one episode label a sample, {n_samples} in all, got shape {labels.shape}"
+            f"{name} contains NaN in row {np.argmax(np.isnan(labels))}: give every sample the label of an episode"
         )
-    if labels.dtype.kind == "f" and np.isnan(labels).any():
-        raise DataError(
-            f"groups contains NaN in row {np.argmax(np.isnan(labels))}: give every sample the label of an episode"
-        )
+    if labels.dtype.kind == "O":
+        try:
+            np.unique(labels)
+        except TypeError:
+            raise DataError(
+                f"{name} holds labels that cannot be compared with each other: give numbers, or text"
+            ) from None
     return labels
 
 
@@ -375,10 +386,87 @@ def check_number(value: object, name: str, *, positive: bool) -> float:
     try:
         number = float(value)  # type: ignore[arg-type]  # anything else is what is caught
     except (TypeError, ValueError, OverflowError):
-        raise PolicyError(f"{name} must be a number {wanted}, got {value!r:.60}") from None
+        raise PolicyError(f"{name} must be a number {wanted}, got {quote(value)}") from None
     if not np.isfinite(number) or number < 0 or (positive and number == 0):
-        raise PolicyError(f"{name} must be a finite number {wanted}, got {value!r:.60}")
+        raise PolicyError(f"{name} must be a finite number {wanted}, got {quote(value)}")
     return number
+
+
+def check_whole(value: object, name: str, *, least: int, most: int | None = None) -> int:
+    """Check an option that is a whole number.
+
+    Parameters
+    ----------
+    value : object
+        What was given.
+    name : str
+        Of the option.
+    least, most : int
+        Bounds, which are allowed themselves; None is no bound.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Raises
+    ------
+    PolicyError
+        If it is not such a number.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):  # type: ignore[operator]  # it is a number
+        wanted = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise PolicyError(f"{name} must be a whole number {wanted}, got {quote(value)}")
+    return int(value)  # type: ignore[call-overload]
+
+
+def check_names(names: Sequence[str], name: str, count: int) -> tuple[str, ...]:
+    """Check names of dimensions.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What was given.
+    name : str
+        Of the argument.
+    count : int
+        How many there must be.
+
+    Returns
+    -------
+    tuple of str
+        The names.
+
+    Raises
+    ------
+    DataError
+        If they are not so many texts.
+    """
+    listed = names if isinstance(names, list | tuple | np.ndarray) and np.ndim(names) == 1 else ()
+    if len(listed) != count or not all(isinstance(each, str) for each in listed):
+        raise DataError(f"{name} must be {count} names, one for each dimension, got {quote(names)}")
+    return tuple(str(each) for each in listed)
+
+
+def quote(value: object) -> str:
+    """Write a value into a sentence: in one line, and cut short.
+
+    Parameters
+    ----------
+    value : object
+        What was given.
+
+    Returns
+    -------
+    str
+        Its representation, or where it has none, its type.
+    """
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # an integer of too many digits, an object that fails to describe itself
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def check_choice(value: object, name: str, choices: tuple[str, ...]) -> str:
@@ -404,7 +492,7 @@ def check_choice(value: object, name: str, choices: tuple[str, ...]) -> str:
         Which lists the choices, if it is none of them.
     """
     if not isinstance(value, str) or value not in choices:
-        raise PolicyError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r:.60}")
+        raise PolicyError(f"{name} must be one of {', '.join(map(repr, choices))}, got {quote(value)}")
     return value
 
 
@@ -437,14 +525,16 @@ def _hint_at_states(X: ArrayLike, expected: int | None) -> str:
 
 @contextmanager
 def _one_sentence(hint: Callable[[], str] = str) -> Iterator[None]:
-    """Turn scikit-learn's ValueErrors into one `DataError` sentence, with a hint at its end."""
+    """Turn what scikit-learn raises into one `DataError` sentence, with a hint at its end."""
     try:
         yield
     except DataError:
         raise
-    except ValueError as error:
-        # Some of scikit-learn's messages print the whole array between their two sentences.
+    except (TypeError, ValueError, OverflowError) as error:
+        # Some of scikit-learn's messages print the whole array between their two sentences, or after them.
         text = re.sub(r":\narray=.*?\n(?=Reshape)", ": ", str(error), flags=re.DOTALL)
+        text = re.sub(r"(?<=not supported)\n\W.*", "", text, flags=re.DOTALL)
         with suppress(ValueError):  # rows of different lengths have no shape
             text += hint()
-        raise DataError(" ".join(text.split())) from None
+        kind = NotNumbersError if isinstance(error, TypeError) else DataError
+        raise kind(" ".join(text.split())) from None

@@ -92,13 +92,39 @@ def check_writable(path: FilePath) -> None:
         raise _OnlyAsked
 
 
+def as_path(path: FilePath) -> Path:
+    """Take what a user gives as a path, with ``~`` for the home folder.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    UnconstrainError
+        It is neither text nor a path, or names the home of a user whom there is not.
+    """
+    try:
+        return Path(path).expanduser()
+    except (TypeError, RuntimeError) as error:
+        raise UnconstrainError(f"{' '.join(repr(path).split()):.60} is no path of a file: {error}") from None
+
+
 class _OnlyAsked(Exception):
     """Leaves what is there as it was."""
 
 
 def _target(path: FilePath) -> Path:
     try:
-        target = Path(os.path.realpath(Path(path).expanduser()))
+        given = as_path(path)
+    except UnconstrainError as error:
+        raise UnconstrainError(f"cannot write: {error}") from None
+    try:
+        target = Path(os.path.realpath(given))
         if not target.parent.is_dir():
             raise UnconstrainError(
                 f"cannot write {path}: there is no folder {target.parent}, so make it first"

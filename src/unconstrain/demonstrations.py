@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain import demonstrations_file
+from unconstrain.arrays import check_number, check_numbers, check_whole, quote
 from unconstrain.errors import DataError, UnconstrainError, printable
+
+MOST_BLOCKS = 2**31
+"""In an episode: labels of blocks are whole numbers of 64 bits."""
 
 if TYPE_CHECKING:
     import pandas
@@ -109,7 +113,7 @@ class Demonstrations:
             "state_names": _names("state_names", state_names, "x", n),
             "action_names": _names("action_names", action_names, "u", d),
             "episode_labels": labels,
-            "notes": tuple(notes),
+            "notes": tuple(_listed("notes", notes)),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -180,12 +184,14 @@ class Demonstrations:
             codes = [code for code, label in enumerate(self.episode_labels) if label == which]
             if len(codes) != 1:
                 raise DataError(
-                    f"{len(codes) or 'no'} episodes are labelled {which!r}; "
+                    f"{len(codes) or 'no'} episodes are labelled {quote(which)}; "
                     f"choose one by its number, 0 to {self.n_episodes - 1}"
                 )
             which = codes[0]
-        if not 0 <= which < self.n_episodes:
-            raise DataError(f"there is no episode {which}; they are numbered 0 to {self.n_episodes - 1}")
+        if not isinstance(which, int | np.integer) or not 0 <= which < self.n_episodes:
+            raise DataError(
+                f"there is no episode {quote(which)}; they are numbered 0 to {self.n_episodes - 1}"
+            )
         return self.select(self.episodes == which)
 
     def blocks(self, k: int) -> Codes:
@@ -209,11 +215,10 @@ class Demonstrations:
 
         Raises
         ------
-        DataError
-            `k` is not a positive integer.
+        PolicyError
+            `k` is not a positive integer, or one above 2³¹.
         """
-        if isinstance(k, bool) or not isinstance(k, int | np.integer) or k < 1:
-            raise DataError(f"blocks(k) needs a positive integer, got {k!r}")
+        k = check_whole(k, "k", least=1, most=MOST_BLOCKS)
         order = np.argsort(self.episodes, kind="stable")
         sizes = np.bincount(self.episodes, minlength=self.n_episodes)
         starts = np.cumsum(sizes) - sizes
@@ -241,9 +246,9 @@ class Demonstrations:
         DataError
             `kind` is unknown, or there is a single episode where episodes are to be held out.
         """
-        kind = kind or ("episodes" if self.n_episodes > 1 else "blocks")
-        if kind not in ("episodes", "blocks"):
-            raise DataError(f"folds must be episodes or blocks, got {kind!r}")
+        kind = kind if kind is not None else ("episodes" if self.n_episodes > 1 else "blocks")
+        if not isinstance(kind, str) or kind not in ("episodes", "blocks"):
+            raise DataError(f"folds must be episodes or blocks, got {quote(kind)}")
         if kind == "blocks":
             return self.blocks(n_blocks)
         if self.n_episodes < 2:
@@ -269,11 +274,10 @@ class Demonstrations:
 
         Raises
         ------
-        DataError
+        PolicyError, DataError
             `min_speed` is not a number ≥ 0, or no sample is that fast.
         """
-        if not (np.isfinite(min_speed) and min_speed >= 0):
-            raise DataError(f"min_speed must be a number not below zero, got {min_speed!r}")
+        min_speed = check_number(min_speed, "min_speed", positive=False)
         speeds = np.linalg.norm(self.actions, axis=1)
         keep = speeds >= min_speed
         slow = int(np.sum(~keep))
@@ -429,10 +433,7 @@ def _projections(values: ArrayLike, count: int, d: int) -> Array:
 
 
 def _array(what: str, values: ArrayLike) -> Array:
-    try:
-        return np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise DataError(f"{what} must be an array of numbers ({error})") from error
+    return np.ascontiguousarray(check_numbers(values, what))
 
 
 def _check_finite(what: str, array: Array, good: NDArray[np.bool_]) -> None:
@@ -487,15 +488,28 @@ def _flags(values: ArrayLike, count: int) -> Array:
 def _names(what: str, names: Sequence[str] | None, letter: str, count: int) -> tuple[str, ...]:
     if names is None:
         return tuple(f"{letter}{i + 1}" for i in range(count))
-    if isinstance(names, str) or len(names) != count:
-        raise DataError(f"{what} must be {count} names, one per dimension, got {names!r}")
+    if isinstance(names, str) or len(_listed(what, names)) != count:
+        raise DataError(f"{what} must be {count} names, one per dimension, got {quote(names)}")
     return tuple(str(name) for name in names)
+
+
+def _listed(what: str, texts: Sequence[str]) -> Sequence[str]:
+    """Refuse a text, or what is no sequence, in place of several texts."""
+    if isinstance(texts, str | bytes) or not (hasattr(texts, "__len__") and hasattr(texts, "__getitem__")):
+        raise DataError(f"{what} must be a list of texts, got {quote(texts)}")
+    try:
+        return [str(text) for text in texts]
+    except TypeError:  # an array without dimensions
+        raise DataError(f"{what} must be a list of texts, got {quote(texts)}") from None
 
 
 def _episodes(
     episodes: ArrayLike | None, labels: Sequence[str] | None, count: int
 ) -> tuple[Codes, tuple[str, ...]]:
-    values = np.zeros(count, dtype=np.int64) if episodes is None else np.asarray(episodes)
+    try:
+        values = np.zeros(count, dtype=np.int64) if episodes is None else np.asarray(episodes)
+    except ValueError:  # rows of different lengths
+        raise DataError("episodes must be integers or strings, one per state") from None
     if values.shape != (count,):
         raise DataError(f"episodes have shape {values.shape} where ({count},) is needed: one per state")
     if values.dtype.kind not in "iuU":
@@ -503,6 +517,7 @@ def _episodes(
     if labels is None:
         distinct, codes = np.unique(values, return_inverse=True)
         return codes.astype(np.int64), tuple(str(value) for value in distinct)
+    labels = _listed("episode_labels", labels)
     if values.dtype.kind == "U" or not np.array_equal(np.unique(values), np.arange(len(labels))):
         raise DataError(
             f"episodes must be the numbers 0 to {len(labels) - 1}, each used, "
@@ -515,7 +530,10 @@ def _index(samples: ArrayLike | slice, count: int) -> Codes:
     if isinstance(samples, slice):
         index = np.arange(count)[samples]
     else:
-        given = np.asarray(samples)
+        try:
+            given = np.asarray(samples)
+        except ValueError:  # rows of different lengths
+            given = np.empty((0, 0))
         if given.dtype == bool:
             if given.shape != (count,):
                 raise DataError(f"the mask has shape {given.shape}, but there are {count} samples")

@@ -6,7 +6,6 @@ metadata of its schema, under the key "unconstrain".
 
 import json
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +27,7 @@ NAMES = ("state_names", "action_names", "episode_labels", "notes")
 
 def write(demos: "Demonstrations", path: str | os.PathLike[str]) -> None:
     """Write demonstrations to an NPZ or Parquet file, by suffix; see `Demonstrations.save`."""
-    suffix = Path(path).suffix.lower()
+    suffix = atomic.as_path(path).suffix.lower()
     if suffix not in (".npz", ".parquet", ".pq"):
         raise DataError(f"cannot save {path}: choose a name that ends in .npz or .parquet")
     if suffix == ".npz":

@@ -48,6 +48,18 @@ class DataError(UnconstrainError):
         self.row, self.column = row, column
 
 
+class NotNumbersError(DataError, TypeError):
+    """Things in place of numbers; a `TypeError` too, as scikit-learn expects of these.
+
+    Parameters
+    ----------
+    message : str
+        The sentence.
+    row, column : int, optional
+        As for `DataError`.
+    """
+
+
 class PolicyError(UnconstrainError):
     """A policy asked for what it cannot do: an unknown option, or states of the wrong dimension."""
 

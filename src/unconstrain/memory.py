@@ -30,7 +30,10 @@ def check_memory(n_bytes: float, what: str, remedy: str) -> None:
     """
     left = available_memory()
     if left is not None and n_bytes > left:
-        needed, free = (f"{size / GIGABYTE:,.1f} GB" for size in (n_bytes, left))
+        needed, free = (
+            f"{size / GIGABYTE:,.1f} GB" if size < 1e18 else f"{size / GIGABYTE:.0e} GB"
+            for size in (n_bytes, left)
+        )
         raise DataError(f"{what} would take {needed} of memory, and {free} are left: {remedy}")
 
 

@@ -25,7 +25,7 @@ Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import SQUARABLE, check_actions, check_projections, check_squarable
+from unconstrain.arrays import SQUARABLE, check_actions, check_number, check_projections, check_squarable
 from unconstrain.errors import DataError
 from unconstrain.motion import directions
 
@@ -243,7 +243,7 @@ def normalized(error: float, Pi: ArrayLike) -> float:
         raise DataError(
             "the true policy is the same at every sample, so no error can be a share of its variance"
         )
-    return error / variance
+    return check_number(error, "the error", positive=False) / variance
 
 
 def explained(U: ArrayLike, P: ArrayLike) -> float:

@@ -14,7 +14,7 @@ constraint, which judges more of the policy.
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +23,14 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from unconstrain import metrics
-from unconstrain.arrays import check_actions, check_groups, check_number, check_projections, check_samples
+from unconstrain.arrays import (
+    check_actions,
+    check_groups,
+    check_number,
+    check_projections,
+    check_samples,
+    quote,
+)
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
@@ -271,9 +278,13 @@ def _name_candidates(
     if isinstance(given, str):
         if given != "auto":
             raise PolicyError(
-                f'candidates must be policies, in a list or a dict by name, or "auto", got {given!r}'
+                f'candidates must be policies, in a list or a dict by name, or "auto", got {quote(given)}'
             )
         return candidates(n, d)
+    if not isinstance(given, Iterable):
+        raise PolicyError(
+            f'candidates must be policies, in a list or a dict by name, or "auto", got {quote(given)}'
+        )
     named: dict[str, Policy] = {}
     for key, policy in given.items() if isinstance(given, Mapping) else ((None, policy) for policy in given):
         own = " ".join(repr(policy).split()) if key is None else str(key)

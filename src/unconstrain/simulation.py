@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import check_numbers, quote
 from unconstrain.constraints.nullspace import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
@@ -95,7 +96,7 @@ def rollout(
     (101, 2)
     """
     if _whole(steps) < 1:
-        raise UnconstrainError(f"a rollout needs a whole number of steps, at least 1, not {steps}")
+        raise UnconstrainError(f"a rollout needs a whole number of steps, at least 1, not {quote(steps)}")
     if constraint is None:
         return simulate(policy, start, steps, dt, stop_when=stop_when)
     if callable(constraint):
@@ -255,17 +256,14 @@ def _whole(steps: Any) -> int:
 def _check_duration(dt: Any) -> None:
     try:
         usable = bool(np.isfinite(dt) and dt > 0)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         usable = False
     if not usable:
-        raise UnconstrainError(f"the time step dt must be a positive number of seconds, not {dt}")
+        raise UnconstrainError(f"the time step dt must be a positive number of seconds, not {quote(dt)}")
 
 
 def _checked_start(start: ArrayLike, expected: int | None) -> Array:
-    try:
-        x = np.atleast_2d(np.asarray(start, dtype=np.float64))
-    except (TypeError, ValueError) as error:
-        raise DataError("the start must be numbers: an array (n,), or (S, n) for several starts") from error
+    x = np.atleast_2d(check_numbers(start, "the start"))
     if x.ndim != 2 or x.size == 0:
         raise DataError(f"the start must be an array (n,), or (S, n) for several, not {np.shape(start)}")
     if expected is not None and x.shape[1] != expected:

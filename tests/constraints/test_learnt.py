@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
 
 import unconstrain as uc
 from reproduction.plants import arm
@@ -127,6 +128,9 @@ def test_errors_of_learnt_constraints_are_those_of_their_definitions():
 
 X, SPANNING = np.zeros((60, 2)), np.random.default_rng(0).normal(size=(60, 3))
 
+FLAT = uc.ConstantConstraint(1).fit(X, SPANNING[:, :2])
+COMPONENT = uc.NullspaceComponent().fit(X, SPANNING[:, :2])
+
 
 @pytest.mark.parametrize(
     ("call", "sentence"),
@@ -151,12 +155,34 @@ X, SPANNING = np.zeros((60, 2)), np.random.default_rng(0).normal(size=(60, 3))
             ),
             "one label a sample, 60 in all",
         ),
+        (
+            lambda: uc.ConstraintChain(uc.ConstantConstraint(1), 1.5).fit(X, SPANNING),
+            r"policy must be an estimator, got 1\.5",
+        ),
+        (lambda: uc.ConstantConstraint(np.eye(2)).fit(X, SPANNING), "whole number from 1 to 2"),
+        (lambda: FLAT.describe(X, "xy"), "action_names must be 2 names"),
+        (lambda: FLAT.describe(X, ["x", 1]), "action_names must be 2 names"),
+        (
+            lambda: COMPONENT.score(X, SPANNING),
+            r"\(60, 3\) and predictions \(60, 2\) must have the same shape",
+        ),
     ],
 )
 def test_mistakes_are_told_in_one_sentence(call, sentence):
     with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def test_a_weight_on_even_length_may_be_of_any_size():
+    rows = uc.FeatureConstraint(alpha=1e308).fit(X + np.arange(60)[:, None], SPANNING * [1, 1, 0]).rows(X)
+    np.testing.assert_allclose(np.abs(rows[:, 0]), np.tile([0.0, 0.0, 1.0], (60, 1)), atol=1e-6)
+
+
+def test_a_constraint_that_was_not_fitted_says_so():
+    for estimator in (uc.ConstantConstraint(), uc.FeatureConstraint()):
+        with pytest.raises(NotFittedError):
+            estimator.describe(X, ["x", "y"])
 
 
 def test_constraints_are_saved_and_loaded(tmp_path):

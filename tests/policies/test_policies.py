@@ -258,7 +258,7 @@ X, U = np.eye(4)[:, :2], np.ones((4, 2))
             "projections= are for",
         ),
         (lambda: uc.ParametricPolicy(alpha="cv").fit(X, U, groups=[1] * 4), "at least two episodes"),
-        (lambda: uc.ParametricPolicy().fit(X, U, groups=[1]), "one episode label a sample"),
+        (lambda: uc.ParametricPolicy().fit(X, U, groups=[1]), "one label a sample"),
         (lambda: uc.LocallyLinearPolicy(width=0).fit(X, U), "width must be a finite number above zero"),
         (lambda: uc.LocallyLinearPolicy(centers="here").fit(X, U), "centers must be one of"),
         (lambda: uc.LocallyLinearPolicy(centers=np.ones((3, 3))).fit(X, U), r"centers must be \(M, 2\)"),

@@ -14,7 +14,7 @@ import pytest
 import unconstrain as uc
 from unconstrain import storage
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.recordings import load
 
 XU = {"state": "x", "action": "u"}
@@ -331,3 +331,19 @@ def test_columns_and_options_are_given_once(tmp_path):
         uc.open(opened, state="x")
     with pytest.raises(DataError, match="window= is about columns of files"):
         uc.open([(np.ones((3, 1)), np.ones((3, 1)))], window=1.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"time_unit": ["s"]}, "time_unit must be one of s, ms, us, ns, got"),
+        ({"window": 10**400}, "window must be a positive number, got 1000"),
+        ({"gap": float("nan")}, "gap must be a positive number, got nan"),
+        ({"state": 1.5}, "state takes column names or positions"),
+        ({"projections": 1e308}, "projections takes column names or positions"),
+    ],
+)
+def test_options_of_another_kind_are_told_before_anything_is_read(given, sentence):
+    with pytest.raises(UnconstrainError, match=sentence) as caught:
+        load("nothing.csv", **given)
+    assert len(str(caught.value)) < 200

@@ -9,7 +9,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_numbers
+from unconstrain.arrays import check_numbers, quote
 from unconstrain.constraints.filtering import check_window, running_mean, running_median, split_episodes
 from unconstrain.errors import DataError
 
@@ -86,12 +86,12 @@ def detect_contact(
     """
     if not (isinstance(threshold, Real) and np.isfinite(threshold) and threshold > 0):
         raise DataError(
-            f"the force threshold must be a number above zero, in the unit of the forces, got {threshold!r}"
+            f"the force threshold must be a number above zero, in the unit of the forces, got {quote(threshold)}"
         )
     release = threshold / 2 if release is None else release
-    if not 0 < release <= threshold:
+    if not (isinstance(release, Real) and 0 < release <= threshold):
         raise DataError(
-            f"release must be above zero and at most the threshold {threshold:g}, got {release!r}"
+            f"release must be above zero and at most the threshold {threshold:g}, got {quote(release)}"
         )
     window = check_window(window)
     touching, steadied = np.zeros(len(F)), np.zeros_like(F)

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import check_groups, quote
 from unconstrain.errors import DataError
 
 Array = NDArray[np.float64]
@@ -28,11 +29,8 @@ def split_episodes(episodes: ArrayLike | None, count: int) -> list[NDArray[np.in
     DataError
         If there is not one label a sample.
     """
-    labels = np.zeros(count, dtype=int) if episodes is None else np.asarray(episodes)
-    if labels.shape != (count,):
-        raise DataError(
-            f"there are {count} forces and episode labels of shape {labels.shape}: give one a sample"
-        )
+    given = check_groups(episodes, count, "episodes")
+    labels = np.zeros(count, dtype=int) if given is None else given
     order = np.argsort(labels, kind="stable")
     return np.split(order, np.flatnonzero(labels[order][1:] != labels[order][:-1]) + 1)
 
@@ -57,7 +55,7 @@ def check_window(window: int) -> int:
     """
     whole = isinstance(window, int | np.integer) and not isinstance(window, bool)
     if not whole or window < 1 or window % 2 == 0:
-        raise DataError(f"the window must be an odd number of samples, got {window!r}")
+        raise DataError(f"the window must be an odd number of samples, got {quote(window)}")
     return int(window)
 
 

@@ -15,6 +15,7 @@ friction. Hence four steps:
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import check_whole
 from unconstrain.constraints.contacts import check_forces, detect_contact, near_change
 from unconstrain.constraints.filtering import running_median, split_episodes
 from unconstrain.constraints.friction import directions_of_motion, remove_along
@@ -82,6 +83,7 @@ def from_forces(
         for own in each:
             size[own] = np.linalg.norm(running_median(F[own], window), axis=1)
         unknown |= (touching == 1) & (np.linalg.norm(steadied, axis=1) < FRICTION * size)
+    margin = check_whole(margin, "margin", least=0)
     if margin:
         unknown |= near_change(touching, margin, each)
     N = from_normals(steadied, J)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_numbers
+from unconstrain.arrays import check_actions
 from unconstrain.errors import DataError
 
 Array = NDArray[np.float64]
@@ -38,10 +38,10 @@ def directions_of_motion(
     DataError
         If shapes do not match.
     """
-    U = check_numbers(actions, "actions")
+    U = check_actions(actions)
     if len(U) != len(F):
         raise DataError(f"there are {len(F)} forces and {len(U)} actions: give one force a sample")
-    if jacobian is not None and U.ndim == 2 and U.shape[1] != jacobian.shape[2]:
+    if jacobian is not None and U.shape[1] != jacobian.shape[2]:
         raise DataError(f"the Jacobian is over {jacobian.shape[2]} actions, but there are {U.shape[1]}")
     velocity = U if jacobian is None else np.einsum("nij,nj->ni", jacobian, U)
     if velocity.shape != F.shape:

@@ -76,11 +76,11 @@ def from_jacobian(jacobian: ArrayLike, rows: Sequence[int] | None = None) -> Arr
     J = _check_not_infinite("the Jacobian", jacobian)
     if J.ndim != 3:
         raise DataError(f"the Jacobian must be (samples, task coordinates, actions), got shape {J.shape}")
-    chosen = list(range(J.shape[1])) if rows is None else list(rows)
-    outside = [row for row in chosen if not -J.shape[1] <= row < J.shape[1]]
+    chosen = check_numbers(range(J.shape[1]) if rows is None else rows, "rows of the Jacobian").ravel()
+    outside = [row for row in chosen.tolist() if not (-J.shape[1] <= row < J.shape[1] and row == int(row))]
     if outside:
-        raise DataError(f"the Jacobian has {J.shape[1]} rows, counted from 0: there is no row {outside[0]}")
-    return projection(J[:, chosen])
+        raise DataError(f"the Jacobian has {J.shape[1]} rows, counted from 0: there is no row {outside[0]:g}")
+    return projection(J[:, chosen.astype(int)])
 
 
 def from_flags(free: ArrayLike, d: int) -> Array:

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import check_whole
 from unconstrain.errors import DataError
+from unconstrain.memory import check_memory
 
 RANK_TOLERANCE = 1e-10
 """A direction counts as constrained if its singular value exceeds this share of the largest one."""
@@ -113,6 +115,13 @@ def unconstrained(d: int, samples: int | None = None) -> NDArray[np.float64]:
     ndarray of shape (d, d) or (samples, d, d)
         Identity matrices.
     """
+    d = check_whole(d, "d", least=1)
+    if samples is not None:
+        samples = check_whole(samples, "samples", least=0)
+    count = 1 if samples is None else samples
+    # No more than a float holds: whole numbers may have any number of digits.
+    size = 8.0 * float(min(d, 10**100)) ** 2 * float(min(count, 10**100))
+    check_memory(size, "the identity of so many actions, for so many samples", "take fewer")
     identity = np.eye(d)
     return identity if samples is None else np.broadcast_to(identity, (samples, d, d)).copy()
 

@@ -4,10 +4,12 @@
 samples, so neither does a policy built on it.
 """
 
+from numbers import Real
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import check_choice, check_finite
+from unconstrain.arrays import check_choice, check_finite, check_numbers, check_whole, quote
 from unconstrain.errors import PolicyError
 from unconstrain.memory import check_memory
 from unconstrain.parallel import cut_blocks
@@ -68,14 +70,13 @@ def place_centers(
         So many centres do not fit into memory.
     """
     if not isinstance(centers, str):
-        placed = np.array(centers, dtype=np.float64, ndmin=2)
+        placed = np.atleast_2d(check_numbers(centers, "centers")).copy()
         if placed.ndim != 2 or placed.shape[1] != X.shape[1] or not len(placed):
             raise PolicyError(f"centers must be (M, {X.shape[1]}) for these states, got shape {placed.shape}")
         check_finite(placed, "centers")
         return placed, _spacing_width(placed, X) if width is None else width
     check_choice(centers, "centers", PLACEMENTS)
-    if not isinstance(n_centers, int | np.integer) or n_centers < 1:
-        raise PolicyError(f"n_centers must be a whole number of at least 1, got {n_centers!r}")
+    n_centers = check_whole(n_centers, "n_centers", least=1)
     if centers == "coverage":
         return _cover(X, int(n_centers), width, coverage)
     by_grid = centers == "grid"
@@ -110,7 +111,7 @@ def grid(X: np.ndarray, n_centers: int) -> np.ndarray:
     # Twice: the coordinates, and the grid that is made of them.
     check_memory(
         2.0 * 8.0 * n * float(per_axis) ** varying,
-        f"a grid of {n_centers:,} centres",
+        "a grid of so many centres",
         "choose a smaller n_centers",
     )
     ticks = (np.arange(per_axis) / (per_axis - 1)) if per_axis > 1 else np.array([0.5])
@@ -144,6 +145,8 @@ def kmeans(
     """
     from sklearn.cluster import KMeans  # slow to import
 
+    if random_state is not None and not isinstance(random_state, np.random.RandomState):
+        random_state = check_whole(random_state, "random_state", least=0, most=2**32 - 1)
     order = np.lexsort(X.T)
     X = X[order]
     distinct = 1 + np.count_nonzero(np.any(X[1:] != X[:-1], axis=1))
@@ -194,8 +197,8 @@ def farthest_first(
 
 def _cover(X: np.ndarray, n_centers: int, width: float | None, coverage: float) -> tuple[np.ndarray, float]:
     """Place centres among the states so that each has an activation of at least `coverage` in one of them."""
-    if not 0 < coverage < 1:
-        raise PolicyError(f"coverage must be a number between 0 and 1, got {coverage!r}")
+    if not (isinstance(coverage, Real) and 0 < coverage < 1):
+        raise PolicyError(f"coverage must be a number between 0 and 1, got {quote(coverage)}")
     # exp(-r² / 2σ²) = coverage at the edge of what a centre covers.
     widths = float(np.sqrt(-2.0 * np.log(coverage)))
     if width is not None:

@@ -19,7 +19,7 @@ from numpy.polynomial.legendre import legvander
 from sklearn.base import BaseEstimator
 from sklearn.preprocessing import SplineTransformer
 
-from unconstrain.arrays import check_choice
+from unconstrain.arrays import check_choice, quote
 from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import check_square
@@ -100,7 +100,7 @@ class DecoupledFeatures(BaseEstimator):
         for name, least in (("n_knots", 2), ("degree", 1)):
             value = getattr(self, name)
             if not isinstance(value, int | np.integer) or value < least:
-                raise PolicyError(f"{name} must be a whole number of at least {least}, got {value!r}")
+                raise PolicyError(f"{name} must be a whole number of at least {least}, got {quote(value)}")
         if sample_weight is not None:
             X = X[sample_weight > 0]
         low, high = X.min(axis=0), X.max(axis=0)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator
 
+from unconstrain.arrays import quote
 from unconstrain.deploy.compiled import CompiledPolicy, Linear
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import Features, fit_transformer, is_feature_map
@@ -45,7 +46,7 @@ class FullFeatures(BaseEstimator):
             hasattr(transformer, "fit") and hasattr(transformer, "transform")
         ):
             raise PolicyError(
-                f"features must be policy features or a scikit-learn transformer, got {transformer!r}"
+                f"features must be policy features or a scikit-learn transformer, got {quote(transformer)}"
             )
         self.transformer = transformer
 

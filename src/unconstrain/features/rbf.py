@@ -16,6 +16,7 @@ from unconstrain.arrays import check_number, check_states, check_weights
 from unconstrain.deploy.compiled import Potential, RadialBasis
 from unconstrain.features.centers import place_centers
 from unconstrain.receptive import normalized_activations
+from unconstrain.undo import undone_on_failure
 
 
 class NormalizedRBF(TransformerMixin, BaseEstimator):
@@ -65,6 +66,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         self.coverage = coverage
         self.random_state = random_state
 
+    @undone_on_failure
     def fit(self, X: ArrayLike, y: None = None, sample_weight: ArrayLike | None = None) -> "NormalizedRBF":
         """Place the centres.
 

@@ -18,6 +18,10 @@ from unconstrain.fitting.sums import Sums
 from unconstrain.motion import NO_MOTION, lengths
 from unconstrain.samples import Samples
 
+OUT_OF_REACH = (
+    "every sample is so far from all centres that it counts for none of them: place the centres among the states, or "
+    "give a larger width"
+)
 NO_DIRECTION = (
     "no action moves, and without motion there is no direction to learn from: check the action columns, or "
     "differentiate the states over a longer window"
@@ -300,6 +304,8 @@ class Accumulator:
     def _folds(self, without: int | None) -> list[Moments]:
         folds = [part for k, part in enumerate(self.total.moments) if part is not None and k != without]
         if folds:
+            if not any(np.any(part.weight) for part in folds):
+                raise DataError(OUT_OF_REACH)
             return folds
         if without is None:
             raise DataError(NO_DIRECTION)

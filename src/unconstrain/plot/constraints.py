@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.constraints.learnt.lines import align
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
 from unconstrain.plot.axes import get_axes, label_plane
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 
@@ -65,8 +66,16 @@ def constraint(learnt: LearntConstraint, demonstrations: Demonstrations, *, ax: 
     -------
     Axes
         With the rows.
+
+    Raises
+    ------
+    DataError
+        The demonstrations have other states or actions than the constraint.
     """
     A = learnt.rows(demonstrations.states)
+    d = demonstrations.actions.shape[1]
+    if A.shape[2] != d:
+        raise DataError(f"the constraint is one of {A.shape[2]} actions, and the demonstrations have {d}")
     if demonstrations.states.shape[1] == A.shape[2] == 3:
         return _draw_in_space(ax, A, demonstrations)
     ax = get_axes(ax)

@@ -8,9 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike
 
+from unconstrain.arrays import check_names, check_numbers
 from unconstrain.diagnostics.report import Identifiability
+from unconstrain.errors import DataError
 from unconstrain.features.centers import farthest_first
-from unconstrain.plot.axes import get_axes
+from unconstrain.plot.axes import check_region, get_axes
 from unconstrain.plot.colors import LEARNT, TRUE
 from unconstrain.plot.trajectories import trajectory
 
@@ -35,8 +37,14 @@ def identifiability_figure(report: Identifiability, state_names: Sequence[str]) 
         Over two states and two actions: the standard deviation as a field, with ellipses. Otherwise: recorded states,
         projected onto pairs of the first three coordinates, coloured by the largest standard deviation in any
         direction. And the share of the policy's directions of which at least so much was observed.
+
+    Raises
+    ------
+    DataError
+        There are not as many names as states.
     """
     X = report.require_samples("where to draw").states
+    state_names = check_names(state_names, "state_names", X.shape[1])
     n, d = X.shape[1], report.policy.n_actions_
     pairs = [(0, 1), (0, 2), (1, 2)] if n > 2 else [(0, 1)] if n == 2 else [(0, 0)]
     figure = Figure(figsize=(4.6 * (len(pairs) + 1), 4.4), layout="constrained")
@@ -87,16 +95,31 @@ def standard_deviation(
     Axes
         With the field, and ellipses of one standard deviation each way. The longest ellipse is a grid spacing long;
         others are in proportion to the root of their size, lest they vanish.
+
+    Raises
+    ------
+    DataError
+        The region or the levels are none, or the policy has other than two states and two actions.
     """
+    low, high = check_region(low, high)
+    n, d = report.policy.n_features_in_, report.policy.n_actions_
+    if (n, d) != (2, 2):
+        raise DataError(
+            f"standard deviations are drawn over two states of a policy with two actions, and this one has {n} states "
+            f"and {d} actions"
+        )
+    if levels is not None:
+        levels = check_numbers(levels, "levels")
+        rising = levels.ndim == 1 and len(levels) > 1 and bool((np.diff(levels) > 0).all())
+        if not (rising and levels[0] > 0 and np.isfinite(levels[-1])):
+            raise DataError("levels must be two or more rising numbers above zero, in units of the action")
     ax = get_axes(ax)
-    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     x, y = (np.linspace(a, b, CELLS) for a, b in zip(low, high, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     deviation = np.sqrt(np.einsum("njj->n", report.covariance(grid))).reshape(CELLS, CELLS)
     if levels is None:
         least = max(float(deviation.min()), 1e-6 * float(deviation.max()), 1e-300)
         levels = np.geomspace(least, max(float(deviation.max()), 2 * least), 17)
-    levels = np.asarray(levels, dtype=np.float64)
     shown = ax.contourf(x, y, np.clip(deviation, levels[0], levels[-1]), levels, norm="log", cmap="viridis")
     decades = 10.0 ** np.arange(np.ceil(np.log10(levels[0])), np.floor(np.log10(levels[-1])) + 1)
     ax.figure.colorbar(

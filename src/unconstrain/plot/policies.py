@@ -9,10 +9,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import (
+    check_actions,
+    check_finite,
+    check_number,
+    check_numbers,
+    check_whole,
+    quote,
+)
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import PolicyError
+from unconstrain.errors import DataError, PolicyError
+from unconstrain.memory import check_memory
 from unconstrain.motion import directions
-from unconstrain.plot.axes import add_title, get_axes, label_plane
+from unconstrain.plot.axes import add_title, check_coordinates, check_region, get_axes, label_plane
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, SERIES, TRUE
 from unconstrain.plot.trajectories import trajectory
 
@@ -82,8 +91,10 @@ def field(
     Axes
         With the arrows.
     """
+    points, spacing = _grid(low, high, check_whole(n, "n", least=1), near)
+    if longest is not None:
+        check_number(longest, "longest", positive=True)
     ax = get_axes(ax)
-    points, spacing = _grid(low, high, n, near)
     reach = spacing * (LONGEST_ARROW if longest is None else 1.0)
     _draw_arrows(ax, points, _predict(policy, points), reach, color, label, longest)
     label_plane(ax, ("x1", "x2"))
@@ -122,8 +133,11 @@ def policy(
     PolicyError
         If the policy's actions do not match those of the demonstrations.
     """
+    P = _matching(policy, demonstrations)
+    if demonstrations.states.shape[1] > 1:
+        check_coordinates(coordinates, demonstrations.states.shape[1])
     ax = get_axes(ax)
-    _draw_policy(ax, policy, _matching(policy, demonstrations), demonstrations, coordinates)
+    _draw_policy(ax, policy, P, demonstrations, coordinates)
     return ax
 
 
@@ -163,11 +177,16 @@ def comparison(
             f"policies are compared as arrows over two or more states, one action a state, and the demonstrations "
             f"have {X.shape[1]} states and {U.shape[1]} actions"
         )
+    i, j = check_coordinates(coordinates, X.shape[1])
+    if not isinstance(policies, Mapping) or not policies:
+        raise PolicyError(
+            f"policies must be a mapping from names to one policy or more, got {quote(policies)}"
+        )
+    every = [_matching(each, demonstrations) for each in policies.values()]
     ax = get_axes(ax)
-    i, j = coordinates
     trajectory(demonstrations, coordinates=coordinates, label="recorded movement", ax=ax)
     shown, cell = _spread(X[:, [i, j]])
-    vectors = [_matching(each, demonstrations)[shown][:, [i, j]] for each in policies.values()]
+    vectors = [each[shown][:, [i, j]] for each in every]
     longest = max(float(np.linalg.norm(each, axis=1).max()) for each in vectors)
     points, reach = X[shown][:, [i, j]], LONGEST_ARROW * cell
     # Narrow arrows over wide ones, so that all are seen where they agree.
@@ -197,10 +216,18 @@ def agreement(actions: ArrayLike, predictions: ArrayLike, *, ax: Axes | None = N
     -------
     Axes
         With a point a sample.
+
+    Raises
+    ------
+    DataError
+        The arrays are not finite, or of different shapes.
     """
+    U, P = check_actions(actions), check_actions(predictions, "predictions")
+    if U.shape != P.shape:
+        raise DataError(f"actions {U.shape} and predictions {P.shape} must have the same shape")
     ax = get_axes(ax)
-    unit, length = directions(np.asarray(actions, dtype=np.float64))
-    along = np.einsum("nd,nd->n", unit, np.asarray(predictions, dtype=np.float64))
+    unit, length = directions(U)
+    along = np.einsum("nd,nd->n", unit, P)
     length, along = length[length > 0], along[length > 0]
     step = max(1, len(length) // SHOWN_POINTS)
     top = float(length.max(initial=0.0)) * 1.05 or 1.0
@@ -275,8 +302,10 @@ def _draw_policy(
 
 
 def _predict(policy: Policy, X: Array) -> Array:
-    P = np.asarray(policy.predict(X) if hasattr(policy, "predict") else policy(X), dtype=np.float64)
-    return P[:, None] if P.ndim == 1 else P
+    predict = getattr(policy, "predict", policy)
+    if not callable(predict):
+        raise PolicyError(f"a policy has a method predict, or is a function of states, not {quote(policy)}")
+    return check_actions(predict(X), "the policy's actions")
 
 
 def _matching(policy: Policy, demonstrations: Demonstrations) -> Array:
@@ -292,14 +321,19 @@ def _matching(policy: Policy, demonstrations: Demonstrations) -> Array:
 
 def _grid(low: ArrayLike, high: ArrayLike, n: int, near: ArrayLike | None) -> tuple[Array, float]:
     """Points of a grid (M, 2), those near some states only, and the shorter of its spacings."""
-    low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    low, high = check_region(low, high)
+    check_memory(8.0 * 20.0 * n * n, f"a field of {n:,} by {n:,} arrows", "draw fewer with n=")
     x, y = (np.linspace(a, b, n) for a, b in zip(low, high, strict=True))
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     spacing = np.where(high > low, (high - low) / max(n - 1, 1), 1.0)
     if near is not None:
         from scipy.spatial import cKDTree  # slow to import
 
-        distance, _ = cKDTree(np.asarray(near) / spacing).query(points / spacing)
+        states = check_numbers(near, "near")
+        if states.ndim != 2 or states.shape[1] != 2:
+            raise DataError(f"near must be states (N, 2), got shape {states.shape}")
+        check_finite(states, "near")
+        distance, _ = cKDTree(states / spacing).query(points / spacing)
         points = points[distance <= 1.0]
     return points, float(spacing.min())
 

@@ -27,9 +27,10 @@ def check_suffix(path: str | os.PathLike[str] | None) -> None:
     UnconstrainError
         If the name ends in anything but `.png`, `.svg` or `.pdf`.
     """
-    if path is not None and Path(path).suffix.lower() not in SUFFIXES:
+    name = "" if path is None else atomic.as_path(path).name
+    if path is not None and os.path.splitext(name)[1].lower() not in SUFFIXES:
         raise UnconstrainError(
-            f"a figure cannot be written to {Path(path).name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
+            f"a figure cannot be written to {name!r}: end the name in {', '.join(SUFFIXES[:-1])} or "
             f"{SUFFIXES[-1]}"
         )
 

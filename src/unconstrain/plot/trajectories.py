@@ -7,8 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from unconstrain.arrays import check_finite, check_groups, check_names, check_numbers
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.plot.axes import get_axes, label_plane
+from unconstrain.errors import DataError
+from unconstrain.plot.axes import check_coordinates, get_axes, label_plane
 from unconstrain.plot.colors import LEARNT, RECORDED
 
 
@@ -43,17 +45,28 @@ def trajectory(
     -------
     Axes
         With the movements.
+
+    Raises
+    ------
+    DataError
+        Movements are no finite array, or have no such coordinates or episodes.
     """
-    ax = get_axes(ax)
     if isinstance(movements, Demonstrations):
         X, episodes = movements.states, movements.episodes
-        label_plane(ax, (movements.state_names[coordinates[0]], movements.state_names[coordinates[1]]))
     else:
-        X = np.asarray(movements, dtype=np.float64)
-    codes = np.zeros(len(X)) if episodes is None else np.asarray(episodes)
-    for i, code in enumerate(np.unique(codes)):
-        path = X[codes == code][:, list(coordinates)]
-        ax.plot(*path.T, style, color=color, lw=1.1, label=label if i == 0 else None, zorder=1)
+        X = check_numbers(movements, "movements")
+        if X.ndim != 2:
+            raise DataError(f"movements must be states (samples, dimensions), got shape {X.shape}")
+        check_finite(X, "movements")
+    i, j = check_coordinates(coordinates, X.shape[1])
+    given = check_groups(episodes, len(X), "episodes")
+    ax = get_axes(ax)
+    if isinstance(movements, Demonstrations):
+        label_plane(ax, (movements.state_names[i], movements.state_names[j]))
+    codes = np.zeros(len(X)) if given is None else given
+    for k, code in enumerate(np.unique(codes)):
+        path = X[codes == code][:, [i, j]]
+        ax.plot(*path.T, style, color=color, lw=1.1, label=label if k == 0 else None, zorder=1)
         ax.plot(*path[0], "o", color=color, ms=2.6, zorder=1)
     return ax
 
@@ -72,10 +85,16 @@ def rollout_figure(movement: Demonstrations, state_names: Sequence[str] | None =
     -------
     Figure
         With two panels.
+
+    Raises
+    ------
+    DataError
+        There are not as many names as states.
     """
+    n = movement.states.shape[1]
+    names = movement.state_names if state_names is None else check_names(state_names, "state_names", n)
     figure = Figure(figsize=(10.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    names = movement.state_names if state_names is None else state_names
     if len(names) > 1:
         trajectory(movement.states, episodes=movement.episodes, color=LEARNT, style="-", ax=left)
         label_plane(left, (names[0], names[1]))

@@ -4,7 +4,6 @@ from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -20,6 +19,7 @@ from unconstrain.arrays import (
     check_states,
     check_weights,
 )
+from unconstrain.atomic import as_path
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
@@ -468,7 +468,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         from unconstrain.deploy import onnx
 
-        onnx.save(self.compile(), Path(path))
+        onnx.save(self.compile(), as_path(path))
 
     def solved(self, *, without: int | None = None) -> Self:
         """Solve anew for `alpha`, if asked without the samples of one fold, in a copy of this policy.

@@ -1,7 +1,8 @@
 """Which column of a recording is what."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 
 from unconstrain.errors import DataError
 
@@ -42,7 +43,8 @@ class Columns:
     Raises
     ------
     DataError
-        `projections` is given together with `force` or `free`, or other columns without `state`.
+        `projections` is given together with `force` or `free`, other columns without `state`, or something in place of
+        columns that is none.
     """
 
     state: Keys | None = None
@@ -54,6 +56,10 @@ class Columns:
     projections: Keys | None = None
 
     def __post_init__(self) -> None:
+        for name in ("state", "action", "force", "projections"):
+            keys = getattr(self, name)
+            if not isinstance(keys, str | Integral | Iterable | None):
+                raise DataError(f"{name} takes column names or positions counted from 0, got {keys!r:.60}")
         if self.projections is not None and not (self.force is self.free is None):
             other = "force" if self.force is not None else "free"
             raise DataError(

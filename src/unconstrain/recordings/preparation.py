@@ -47,16 +47,20 @@ class Preparation:
     force_threshold: float | None = None
 
     def __post_init__(self) -> None:
-        if self.time_unit is not None and self.time_unit not in TIME_UNITS:
-            raise DataError(f"time_unit must be one of {', '.join(TIME_UNITS)}, got {self.time_unit!r}")
+        unit = self.time_unit
+        if unit is not None and not (isinstance(unit, str) and unit in TIME_UNITS):
+            raise DataError(
+                f"time_unit must be one of {', '.join(TIME_UNITS)}, got {' '.join(repr(unit).split()):.60}"
+            )
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name == "time_unit" or value is None:
                 continue
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, Real)
-                or not math.isfinite(value)
-                or value <= 0
-            ):
-                raise DataError(f"{field.name} must be a positive number, got {value!r}")
+            try:
+                number = float(value)
+            except (TypeError, ValueError, OverflowError):
+                number = math.nan
+            if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
+                raise DataError(
+                    f"{field.name} must be a positive number, got {' '.join(repr(value).split()):.60}"
+                )

@@ -20,7 +20,7 @@ from sklearn.base import clone
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from unconstrain import atomic
-from unconstrain.arrays import check_samples
+from unconstrain.arrays import check_number, check_samples, check_whole
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.solve import ONE_FOLD
@@ -98,6 +98,8 @@ def fit_stream(
         A checkpoint that belongs to something else or is damaged.
     """
     opened = open_for(policy, recordings, batch_rows)
+    check_number(checkpoint_seconds, "checkpoint_seconds", positive=False)
+    check_whole(sample_rows, "sample_rows", least=1)
     source = opened.source
     settings = {"batch_rows": batch_rows, "sample_rows": sample_rows, "random_state": random_state}
     belongs_to: dict[str, str] = {}

@@ -16,7 +16,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 from io import BufferedIOBase
-from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
 from unconstrain import atomic
@@ -219,7 +218,7 @@ def kind_of(path: FilePath) -> Kind | None:
     ArchiveError
         The file is one of unconstrain's, and is damaged or was written by a newer release.
     """
-    path = Path(path).expanduser()
+    path = atomic.as_path(path)
     if not path.is_file():
         return None
     with path.open("rb") as file:
@@ -231,7 +230,7 @@ def kind_of(path: FilePath) -> Kind | None:
 
 @contextmanager
 def _opened(path: FilePath, kind: Kind) -> Iterator[IO[bytes]]:
-    shown, path = os.fspath(path), Path(path).expanduser()
+    path, shown = atomic.as_path(path), os.fspath(path)
     try:
         mode = path.stat().st_mode  # before opening: opening a pipe would wait for someone to write
         if not stat.S_ISREG(mode):

@@ -11,7 +11,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils.validation import check_is_fitted
 
 from unconstrain import metrics
-from unconstrain.arrays import check_actions, check_groups, check_samples, check_states
+from unconstrain.arrays import check_actions, check_groups, check_names, check_samples, check_states, quote
 from unconstrain.constraints.learnt.lines import equation, mean_line
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.solve import splits
@@ -152,13 +152,15 @@ class LearntConstraint(BaseEstimator, ABC):
         str
             Several lines.
         """
+        check_is_fitted(self)
+        names = check_names(action_names, "action_names", self.n_actions_)
         lines = [f"rows: {self.n_constraints_} ({self.reason_})"]
         A = self.rows(X)
         for j in range(A.shape[1]):
             mean = mean_line(A[:, j])
             turned = np.degrees(np.arccos(np.clip(np.abs(A[:, j] @ mean), 0.0, 1.0)))
             lines.append(
-                f"  {equation(mean, action_names)}   on average; it turns by {np.median(turned):.0f}° (median)"
+                f"  {equation(mean, names)}   on average; it turns by {np.median(turned):.0f}° (median)"
             )
         return "\n".join(lines)
 
@@ -209,7 +211,7 @@ class LearntConstraint(BaseEstimator, ABC):
         if not whole or not 1 <= n_constraints < self.n_actions_:
             raise PolicyError(
                 f"n_constraints must be a whole number from 1 to {self.n_actions_ - 1}, one below the actions' "
-                f"{self.n_actions_}, or None, got {n_constraints!r}"
+                f"{self.n_actions_}, or None, got {quote(n_constraints)}"
             )
         return int(n_constraints)
 

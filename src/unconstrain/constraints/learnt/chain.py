@@ -7,10 +7,11 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain.arrays import check_actions, check_groups, check_samples
+from unconstrain.arrays import check_actions, check_groups, check_samples, quote
 from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.constraints.learnt.component import NullspaceComponent
-from unconstrain.errors import DataError
+from unconstrain.errors import PolicyError
+from unconstrain.undo import undone_on_failure
 
 
 class ConstraintChain(RegressorMixin, BaseEstimator):
@@ -52,6 +53,7 @@ class ConstraintChain(RegressorMixin, BaseEstimator):
         self.policy = policy
         self.component = component
 
+    @undone_on_failure
     def fit(
         self,
         X: ArrayLike,
@@ -86,11 +88,12 @@ class ConstraintChain(RegressorMixin, BaseEstimator):
         """
         X, U = check_samples(self, X, U, reset=True, min_samples=2)
         U, groups = check_actions(U), check_groups(groups, len(X))
-        labels = np.zeros(len(X), dtype=int) if conditions is None else np.asarray(conditions)
-        if labels.shape != (len(X),):
-            raise DataError(
-                f"conditions must hold one label a sample, {len(X)} in all, got shape {labels.shape}"
-            )
+        for name in ("constraint", "policy", "component"):
+            part = getattr(self, name)
+            if not hasattr(part, "fit") and not (part is None and name == "component"):
+                raise PolicyError(f"{name} must be an estimator, got {quote(part)}")
+        given = check_groups(conditions, len(X), "conditions")
+        labels = np.zeros(len(X), dtype=int) if given is None else given
         self.components_, self.constraints_ = {}, {}
         self.projections_ = np.empty((*U.shape, U.shape[1]))
         for label in np.unique(labels).tolist():

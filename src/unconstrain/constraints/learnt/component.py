@@ -12,6 +12,7 @@ from unconstrain.errors import DataError
 from unconstrain.features.base import Features, fit_features
 from unconstrain.features.full import as_features
 from unconstrain.motion import root_mean_square
+from unconstrain.undo import undone_on_failure
 
 OTHER_STARTS = 4
 """Starts besides regression, scattered around it by its own size."""
@@ -61,6 +62,7 @@ class NullspaceComponent(BaseEstimator):
         self.features = features
         self.alpha = alpha
 
+    @undone_on_failure
     def fit(self, X: ArrayLike, U: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
         """Learn from recordings in which the task part varies.
 
@@ -171,6 +173,8 @@ class NullspaceComponent(BaseEstimator):
             If nothing moves.
         """
         U, P = check_actions(U), self.predict(X)
+        if U.shape != P.shape:
+            raise DataError(f"actions {U.shape} and predictions {P.shape} must have the same shape")
         scale = root_mean_square(U)
         if scale == 0.0:
             raise DataError("all actions are zero: there is nothing to explain")

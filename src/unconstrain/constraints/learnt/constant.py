@@ -5,13 +5,15 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from sklearn.utils.validation import check_is_fitted
 
-from unconstrain.arrays import check_weights
+from unconstrain.arrays import check_names, check_weights
 from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.constraints.learnt.lines import equation
 from unconstrain.constraints.learnt.spectrum import count_constrained, format_shares
 from unconstrain.errors import DataError
 from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.undo import undone_on_failure
 
 JACKKNIFE_FOLDS = 10
 
@@ -61,6 +63,7 @@ class ConstantConstraint(LearntConstraint):
     def __init__(self, n_constraints: int | None = None):
         self.n_constraints = n_constraints
 
+    @undone_on_failure
     def fit(
         self,
         X: ArrayLike,
@@ -147,8 +150,10 @@ class ConstantConstraint(LearntConstraint):
         str
             Several lines.
         """
+        check_is_fitted(self)
+        names = check_names(action_names, "action_names", self.n_actions_)
         lines = [f"rows: {self.n_constraints_} ({self.reason_})"]
-        lines += [f"  {equation(row, action_names)}" for row in self.rows_]
+        lines += [f"  {equation(row, names)}" for row in self.rows_]
         lines.append(f"how sure: standard error of the direction {np.degrees(self.uncertainty_):.2g}°")
         return "\n".join(lines)
 

@@ -32,6 +32,7 @@ from unconstrain.features.base import Features, fit_features
 from unconstrain.features.full import as_features
 from unconstrain.fitting.solve import EpisodeFolds
 from unconstrain.motion import root_mean_square
+from unconstrain.undo import undone_on_failure
 
 RHOS = np.array([1e-10, 1e-8, 1e-7, 1e-6, 1e-4, 1e-2, 1e-1])
 RESOLUTION = 1e-10
@@ -101,6 +102,7 @@ class FeatureConstraint(LearntConstraint):
         self.n_constraints = n_constraints
         self.alpha = alpha
 
+    @undone_on_failure
     def fit(self, X: ArrayLike, U: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
         """Learn from actions that were all under one constraint.
 
@@ -240,7 +242,7 @@ class _Problem:
         index = index[:: max(1, len(index) // SAMPLES_TO_EVEN)]
         weights, U = self.weights[index], self.U[index]
         # Rows of the eigenvectors that the largest ρ can make use of, (J, N, d), of mean square length 1.
-        useful = directions[:, shares - shares[0] <= max(rhos) / DAMPED]
+        useful = directions[:, (shares - shares[0]) * DAMPED <= max(rhos)]
         rows = self.phi[index] @ useful
         rows -= self.before[index].swapaxes(1, 2) @ (self.before[index] @ rows)
         rows = np.moveaxis(rows, 2, 0) * np.sqrt(np.sum(self.weights[own]))

@@ -29,3 +29,9 @@ def test_a_folder_that_cannot_be_made_is_a_mistake(run, tmp_path):
     code, _, err = run("demo", "--out", "taken")
     assert code == 2
     assert "cannot make the folder taken" in err
+
+
+def test_the_folder_of_nobody_is_not_made(run, tmp_path):
+    code, _, said = run("demo", "--out", "~nobody-of-that-name/demo")
+    assert (code, list(tmp_path.iterdir())) == (2, [])
+    assert said.startswith("error:")

@@ -96,15 +96,18 @@ def case(rng: np.random.Generator, folder: Path, stock: Path) -> Case:
                              ["file:///etc/passwd"], ["*"], ["taken.skops"], ["~/x"], ["-"]))]  # fmt: skip
         places = places[0]
     arguments += places
-    if spoils and rng.random() < 0.05:
-        del arguments[int(rng.integers(len(arguments)))]
+    if spoils and rng.random() < 0.05 and len(arguments) > 1:
+        del arguments[int(rng.integers(1, len(arguments)))]
     out = folder.parent / "log"
     arguments = [
         os.fsencode(a.replace("\0", "")).decode("utf-8", "surrogateescape") if _encodable(a) else "x"
         for a in arguments
     ]
-    inputs = {"movements.csv", "movements.npz", "pipe.csv", "loop.csv"} | (
-        {"policy.skops"} if name != "fit" else set()
+    inputs = (
+        set()
+        if name == "demo"
+        else {"movements.csv", "movements.npz", "pipe.csv", "loop.csv"}
+        | ({"policy.skops"} if name != "fit" else set())
     )
     existing = {str(p.relative_to(folder)) for p in folder.rglob("*")}
     replaced = "--overwrite" in arguments

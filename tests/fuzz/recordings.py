@@ -80,7 +80,7 @@ class Table:
         """Change some of what the columns hold."""
         name = pick(rng, list(self.columns))
         values = list(self.columns[name])
-        way = int(rng.integers(9))
+        way = int(rng.integers(9)) if values else 8
         if way <= 3:
             for _ in range(int(rng.integers(1, 3))):
                 value = pick(rng, [*NUMBERS, *TEXTS, *CELLS, [1.0], [], [[1]], b"x", {"a": 1}])
@@ -223,7 +223,7 @@ def _folder(rng: np.random.Generator, table: Table, folder: Path) -> Any:
         (place / "again").symlink_to(place)
         table.done.append("a link to itself")
     if "episode" not in table.how:
-        table.episodes = np.zeros(len(table.states), dtype=int)
+        table.episodes = (np.arange(len(table.states)) >= cut).astype(int)  # an episode is a file then
     return place
 
 
@@ -395,6 +395,9 @@ def _check_blocks(source: Any, how: dict[str, Any], rows: int, whole: Any) -> No
         blocks = list(uc.open(source, **how).blocks(rows))
     except UnconstrainError as error:
         # An episode that comes back later can be read at once, but not block by block.
+        comes_back = whole is not None and (np.diff(whole.episodes) < 0).any()
+        if comes_back:
+            return
         if whole is not None and "after others" not in str(error) and "goes on" not in str(error):
             raise AssertionError(f"blocks were refused: {error}") from error
         return

@@ -340,6 +340,8 @@ def test_columns_and_options_are_given_once(tmp_path):
         ({"window": 10**400}, "window must be a positive number, got 1000"),
         ({"gap": float("nan")}, "gap must be a positive number, got nan"),
         ({"state": 1.5}, "state takes column names or positions"),
+        ({"time": ["t"]}, "time takes a column's name or position"),
+        ({"episode": np.eye(2)}, "episode takes a column's name or position"),
         ({"projections": 1e308}, "projections takes column names or positions"),
     ],
 )

@@ -30,6 +30,7 @@ COLUMNS = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explaine
 @click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in that folder.")
 def demo(out: Path, overwrite: bool) -> None:
     """Simulate 40 constrained movements, learn the policy behind them, draw it."""
+    out = atomic.as_path(out)
     picture, table = out / "limit-cycle.png", out / "table.md"
     data, others = out / "movements.csv", out / "others.csv"
     try:

@@ -60,6 +60,13 @@ class Columns:
             keys = getattr(self, name)
             if not isinstance(keys, str | Integral | Iterable | None):
                 raise DataError(f"{name} takes column names or positions counted from 0, got {keys!r:.60}")
+            if not isinstance(keys, str | Integral | list | tuple | None):
+                object.__setattr__(self, name, list(keys))  # of an array, which is not equal to anything
+        for name in ("time", "episode", "free"):
+            key = getattr(self, name)
+            if not isinstance(key, str | Integral | None):
+                shown = " ".join(repr(key).split())
+                raise DataError(f"{name} takes a column's name or position counted from 0, got {shown:.60}")
         if self.projections is not None and not (self.force is self.free is None):
             other = "force" if self.force is not None else "free"
             raise DataError(

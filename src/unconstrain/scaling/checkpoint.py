@@ -133,6 +133,9 @@ def _check(found: dict[str, Any]) -> None:
     wrong = [name for name, kind in kinds.items() if not isinstance(found[name], kind)]
     if wrong:
         raise TypeError(f"it holds another {wrong[0]}")
+    for part in (*found["sums"].moments, *found["accumulator"].total.moments):
+        if part is not None and not all(np.isfinite(each).all() for each in (part.H, part.g, part.weight)):
+            raise TypeError("its sums are not finite")
     if not all(isinstance(note, tuple) and len(note) == len(fields(Note)) for note in found["notes"]):
         raise TypeError("it holds notes that are none")
 

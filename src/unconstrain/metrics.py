@@ -237,6 +237,8 @@ def normalized(error: float, Pi: ArrayLike) -> float:
         If the policy does not vary.
     """
     Pi = check_actions(Pi, "the true policy")
+    if not len(Pi):
+        raise DataError("no samples: the variance of the true policy needs at least one")
     check_squarable("the true policy's actions", Pi)
     variance = float(np.sum(np.var(Pi, axis=0)))
     if variance == 0.0:

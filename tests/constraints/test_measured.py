@@ -74,7 +74,14 @@ def test_forces_and_flags_are_loaded_saved_and_used(tmp_path):
         (lambda: constraints.from_jacobian(np.ones((3, 6, 7)), [6]), "there is no row 6"),
         (lambda: constraints.from_flags([0, np.nan], 2), "row 1 is NaN"),
         (lambda: constraints.first_known(), "no projections to choose from"),
-        (lambda: constraints.from_forces(np.ones((3, 2)), 0), "threshold must be a number above zero"),
+        (
+            lambda: constraints.from_forces(np.ones((3, 2)), 0),
+            "threshold, in the unit of the forces, must be a",
+        ),
+        (
+            lambda: constraints.from_forces(np.ones((3, 2)), 10**400),
+            "threshold, in the unit of the forces, must be a",
+        ),
         (
             lambda: constraints.from_forces(np.ones((3, 2)), 1, release=2),
             "release must be above zero and at most",

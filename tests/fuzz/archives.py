@@ -185,6 +185,7 @@ def _rewritten(rng: np.random.Generator, path: Path) -> str:
         if notes and rng.random() < 0.6:
             try:
                 note = json.loads(members[notes[0]])
+                json.dumps(note)
             except RecursionError:
                 continue  # it was nested already
             done.append(_change_tree(rng, note))

@@ -34,7 +34,7 @@ from unconstrain.errors import UnconstrainError
 
 AREAS = ("recordings", "archives", "commands", "arguments")
 """The modules of this package that make inputs."""
-SECONDS = 60
+SECONDS = 120
 """An input that takes longer hangs. Even on a busy machine the slowest takes a few seconds."""
 GIGABYTE = 2**30
 """What an input may take besides what the imports took."""

@@ -16,7 +16,7 @@ TEXTS: list[Any] = [
     "\ud800", "日本", "x" * 300, "-x", "--out", "'", '"', "a,b", "%s", "{0}", "../x", "~nobody/x", "\u202eabc", "x=1",
 ]  # fmt: skip
 OBJECTS: list[Any] = [
-    [], {}, (), set(), object(), b"bytes", [[]], [None], [[1], [1, 2]], {"a": 1}, int, np.eye(2), np.array([]),
+    [], {}, (), set(), object(), b"bytes", [[]], [None], [[1], [1, 2]], {"a": 1}, np.eye(2), np.array([]),
     ["x", "x"], [0, 0], [-1], [True], np.array(None), range(3), iter([1, 2]), Path("/"), slice(None), 1j,
 ]  # fmt: skip
 CELLS: list[str] = [

@@ -340,6 +340,7 @@ def test_columns_and_options_are_given_once(tmp_path):
         ({"window": 10**400}, "window must be a positive number, got 1000"),
         ({"gap": float("nan")}, "gap must be a positive number, got nan"),
         ({"state": 1.5}, "state takes column names or positions"),
+        ({"state": np.array(None)}, "state takes column names or positions"),
         ({"time": ["t"]}, "time takes a column's name or position"),
         ({"episode": np.eye(2)}, "episode takes a column's name or position"),
         ({"projections": 1e308}, "projections takes column names or positions"),
@@ -349,3 +350,19 @@ def test_options_of_another_kind_are_told_before_anything_is_read(given, sentenc
     with pytest.raises(UnconstrainError, match=sentence) as caught:
         load("nothing.csv", **given)
     assert len(str(caught.value)) < 200
+
+
+def test_columns_may_be_an_array_or_a_number_of_numpy(tmp_path):
+    (tmp_path / "a.csv").write_text("x,y,u,v\n1,2,3,4\n5,6,7,8\n")
+    demos = load(tmp_path / "a.csv", state=np.array(["x", "y"]), action=np.array([2, 3]))
+    assert demos.actions.tolist() == [[3.0, 4.0], [7.0, 8.0]]
+    assert load(tmp_path / "a.csv", state=np.int8(0), action=np.int8(2)).states.tolist() == [[1.0], [5.0]]
+
+
+def test_an_archive_without_states_is_damaged(tmp_path):
+    path = tmp_path / "a.npz"
+    Demonstrations(np.eye(2), np.eye(2)).save(path)
+    about, arrays = storage.read(path, storage.Kind.DEMONSTRATIONS)
+    storage.write(path, storage.Kind.DEMONSTRATIONS, about, arrays | {"states": np.array("x")})
+    with pytest.raises(DataError, match="it holds no states"):
+        load(path)

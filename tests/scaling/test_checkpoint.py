@@ -1,5 +1,8 @@
 """A checkpoint that cannot be written costs no work: it is refused before, or warned of and done without."""
 
+import json
+import re
+
 import numpy as np
 import pytest
 from sklearn.preprocessing import FunctionTransformer
@@ -41,3 +44,20 @@ def test_a_checkpoint_is_an_archive_of_its_own_kind(tmp_path):
     again = uc.ParametricPolicy(FunctionTransformer(np.tanh), alpha=1e-6)
     uc.fit_stream(again, BATCHES, checkpoint=tmp_path / "run")  # trusts what the policy itself holds
     np.testing.assert_array_equal(again.predict(X), policy.predict(X))
+
+
+@pytest.mark.parametrize("spoil", ["weight", "shortest"])
+def test_a_checkpoint_whose_sums_are_none_is_damaged(tmp_path, spoil):
+    path = tmp_path / "run"
+    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), BATCHES, checkpoint=path)
+    tree, arrays = storage.read(path, storage.Kind.CHECKPOINT)
+    if spoil == "weight":
+        name = next(name for name in arrays if name.endswith("weight"))
+        arrays[name] = np.full_like(arrays[name], np.nan)
+    else:
+        text = json.dumps(tree)
+        assert '"shortest": ' in text
+        tree = json.loads(re.sub(r'"shortest": ([[{][^]}]*[]}]|[^,}]*)', '"shortest": "short"', text))
+    storage.write(path, storage.Kind.CHECKPOINT, tree, arrays)
+    with pytest.raises(uc.errors.ArchiveError, match=r"is damaged .*: delete it to start anew"):
+        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), BATCHES, checkpoint=path)

@@ -9,9 +9,9 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_numbers, quote
+from unconstrain.arrays import check_number, check_numbers, quote
 from unconstrain.constraints.filtering import check_window, running_mean, running_median, split_episodes
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, PolicyError
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -84,10 +84,10 @@ def detect_contact(
     DataError
         If a number makes no sense.
     """
-    if not (isinstance(threshold, Real) and np.isfinite(threshold) and threshold > 0):
-        raise DataError(
-            f"the force threshold must be a number above zero, in the unit of the forces, got {quote(threshold)}"
-        )
+    try:
+        threshold = check_number(threshold, "the force threshold, in the unit of the forces,", positive=True)
+    except PolicyError as error:  # here a number that goes with the data
+        raise DataError(str(error)) from None
     release = threshold / 2 if release is None else release
     if not (isinstance(release, Real) and 0 < release <= threshold):
         raise DataError(

@@ -1,6 +1,6 @@
 """Which column of a recording is what."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Integral
 
@@ -58,10 +58,16 @@ class Columns:
     def __post_init__(self) -> None:
         for name in ("state", "action", "force", "projections"):
             keys = getattr(self, name)
-            if not isinstance(keys, str | Integral | Iterable | None):
-                raise DataError(f"{name} takes column names or positions counted from 0, got {keys!r:.60}")
-            if not isinstance(keys, str | Integral | list | tuple | None):
-                object.__setattr__(self, name, list(keys))  # of an array, which is not equal to anything
+            if isinstance(keys, str | int | list | tuple | None):
+                continue
+            try:  # NumPy's numbers and arrays, whose comparison with other columns is no truth value
+                plain = int(keys) if isinstance(keys, Integral) else list(keys)
+            except TypeError:
+                shown = " ".join(repr(keys).split())
+                raise DataError(
+                    f"{name} takes column names or positions counted from 0, got {shown:.60}"
+                ) from None
+            object.__setattr__(self, name, plain)
         for name in ("time", "episode", "free"):
             key = getattr(self, name)
             if not isinstance(key, str | Integral | None):

@@ -134,8 +134,11 @@ def _check(found: dict[str, Any]) -> None:
     if wrong:
         raise TypeError(f"it holds another {wrong[0]}")
     for part in (*found["sums"].moments, *found["accumulator"].total.moments):
-        if part is not None and not all(np.isfinite(each).all() for each in (part.H, part.g, part.weight)):
+        if part is not None and not all(
+            np.isfinite(each).all() for each in (part.H, part.g, part.squares, part.weight)
+        ):
             raise TypeError("its sums are not finite")
+    found["sums"] + Sums()  # raises for counts that are none
     if not all(isinstance(note, tuple) and len(note) == len(fields(Note)) for note in found["notes"]):
         raise TypeError("it holds notes that are none")
 

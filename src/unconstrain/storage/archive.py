@@ -97,7 +97,7 @@ def damaged(path: FilePath, kind: Kind, reason: str) -> ArchiveError:
     -------
     ArchiveError
     """
-    return ArchiveError(f"{os.fspath(path)} is damaged ({reason}): {kind.remedy}")
+    return ArchiveError(f"{os.fspath(path)} is damaged ({reason:.200}): {kind.remedy}")
 
 
 def write(path: FilePath, kind: Kind, tree: Any, arrays: Mapping[str, "np.ndarray"]) -> None:

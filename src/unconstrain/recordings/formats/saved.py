@@ -19,7 +19,7 @@ from unconstrain.recordings.formats.base import ColumnKey, Declared
 from unconstrain.recordings.formats.npz import header_of, to_arrow
 from unconstrain.recordings.table import Header, row
 from unconstrain.storage import Kind, read
-from unconstrain.storage.archive import NOTE
+from unconstrain.storage.archive import NOTE, damaged
 
 
 class Saved:
@@ -91,6 +91,8 @@ class Saved:
             about, arrays = read(path, Kind.DEMONSTRATIONS)
         except ArchiveError as error:
             raise DataError(str(error).replace(path, self.file.shown)) from error
+        if "states" in arrays and arrays["states"].ndim == 0:
+            raise damaged(self.file.shown, Kind.DEMONSTRATIONS, "it holds no states")
         return InMemory(arrays, about, self.file)
 
 

@@ -281,7 +281,7 @@ def _name_candidates(
                 f'candidates must be policies, in a list or a dict by name, or "auto", got {quote(given)}'
             )
         return candidates(n, d)
-    if not isinstance(given, Iterable):
+    if not isinstance(given, Iterable) or isinstance(given, np.ndarray):
         raise PolicyError(
             f'candidates must be policies, in a list or a dict by name, or "auto", got {quote(given)}'
         )

@@ -162,6 +162,7 @@ COMPONENT = uc.NullspaceComponent().fit(X, SPANNING[:, :2])
         (lambda: uc.ConstantConstraint(np.eye(2)).fit(X, SPANNING), "whole number from 1 to 2"),
         (lambda: FLAT.describe(X, "xy"), "action_names must be 2 names"),
         (lambda: FLAT.describe(X, ["x", 1]), "action_names must be 2 names"),
+        (lambda: COMPONENT.score(X, SPANNING[:, :2] * 1e-200), "so much larger than the actions"),
         (
             lambda: COMPONENT.score(X, SPANNING),
             r"\(60, 3\) and predictions \(60, 2\) must have the same shape",

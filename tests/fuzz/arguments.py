@@ -35,7 +35,18 @@ PROTOCOL = {
     "get_feature_names_out", "slopes", "compile_descent",
 }  # fmt: skip
 """Methods that only other parts of the library call, with arguments that were checked already."""
-HOW = {"checkpoint", "n_jobs", "ax", "progress", "color", "style", "label", "posterior", "stop_when"}
+HOW = {
+    "checkpoint",
+    "resumable",
+    "n_jobs",
+    "ax",
+    "progress",
+    "color",
+    "style",
+    "label",
+    "posterior",
+    "stop_when",
+}
 """Arguments that do not say what is computed: where it is drawn, how it looks; and objects that the library made."""
 ESTIMATORS = (
     "ParametricPolicy", "LocallyLinearPolicy", "ConstantConstraint", "FeatureConstraint", "NullspaceComponent",

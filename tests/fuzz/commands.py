@@ -103,12 +103,9 @@ def case(rng: np.random.Generator, folder: Path, stock: Path) -> Case:
         os.fsencode(a.replace("\0", "")).decode("utf-8", "surrogateescape") if _encodable(a) else "x"
         for a in arguments
     ]
-    inputs = (
-        set()
-        if name == "demo"
-        else {"movements.csv", "movements.npz", "pipe.csv", "loop.csv"}
-        | ({"policy.skops"} if name != "fit" else set())
-    )
+    taken = {parameter.name for parameter in command.params}
+    inputs = {"movements.csv", "movements.npz", "pipe.csv", "loop.csv"} if "files" in taken else set()
+    inputs |= {"policy.skops"} if "policy" in taken else set()
     existing = {str(p.relative_to(folder)) for p in folder.rglob("*")}
     replaced = "--overwrite" in arguments
     state = {"new": set[str]()}

@@ -81,6 +81,8 @@ class Table:
         name = pick(rng, list(self.columns))
         values = list(self.columns[name])
         way = int(rng.integers(9)) if values else 8
+        if way == 5 and any(isinstance(v, list | dict | tuple | bytes) for v in values):
+            way = 8
         if way <= 3:
             for _ in range(int(rng.integers(1, 3))):
                 value = pick(rng, [*NUMBERS, *TEXTS, *CELLS, [1.0], [], [[1]], b"x", {"a": 1}])

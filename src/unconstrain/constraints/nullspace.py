@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_whole
+from unconstrain.arrays import check_numbers, check_whole
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 
@@ -128,12 +128,12 @@ def unconstrained(d: int, samples: int | None = None) -> NDArray[np.float64]:
 
 def _check_rows(A: ArrayLike) -> NDArray[np.float64]:
     try:
-        rows = np.asarray(A, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        rows = check_numbers(A, "a constraint matrix")
+    except DataError as error:
         raise DataError(
-            "a constraint matrix must be an array of numbers of shape (k, d) or (N, k, d); "
-            "pad samples that have fewer constraints with rows of zeros"
-        ) from error
+            f"{error}; a constraint matrix must be an array of numbers of shape (k, d) or (N, k, d): pad samples that "
+            "have fewer constraints with rows of zeros"
+        ) from None
     if rows.ndim not in (2, 3):
         raise DataError(
             f"a constraint matrix must have shape (k, d), or (N, k, d) for one per sample, not {rows.shape}; "

@@ -9,6 +9,7 @@ from unconstrain.arrays import (
     check_groups,
     check_number,
     check_projections,
+    check_squarable,
     check_states,
     check_weights,
 )
@@ -135,6 +136,7 @@ def check_recordings(
         The arrays do not fit together or do not fit the policy, or nothing moves.
     """
     states, actions = check_states(policy, X), check_actions(U)
+    check_squarable("the actions U", actions)
     if actions.shape != (len(states), policy.n_actions_):
         raise DataError(
             f"these recordings have {len(states)} states and actions of shape {actions.shape}, and the policy has "

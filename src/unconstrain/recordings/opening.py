@@ -201,7 +201,9 @@ def _recording(
     except DataError as error:
         if declared is None or columns != Columns():
             raise
-        raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations ({error})") from error
+        raise DataError(
+            f"{shown} is damaged and cannot be read as saved demonstrations ({error!s:.300})"
+        ) from error
     if robot is not None:
         roles = replace(
             roles,

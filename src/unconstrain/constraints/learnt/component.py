@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain.arrays import check_actions, check_number, check_samples, check_states
+from unconstrain.arrays import SQUARABLE, check_actions, check_number, check_samples, check_states
 from unconstrain.errors import DataError
 from unconstrain.features.base import Features, fit_features
 from unconstrain.features.full import as_features
@@ -178,6 +178,10 @@ class NullspaceComponent(BaseEstimator):
         scale = root_mean_square(U)
         if scale == 0.0:
             raise DataError("all actions are zero: there is nothing to explain")
+        if np.abs(P).max() / SQUARABLE > scale:
+            raise DataError(
+                "predictions are so much larger than the actions that their squares cannot be compared"
+            )
         U, P = U / scale, P / scale
         length = np.linalg.norm(P, axis=1)
         along = np.divide(np.einsum("nd,nd->n", P, U), length, out=np.zeros_like(length), where=length > 0)

@@ -14,6 +14,9 @@ from unconstrain.errors import PolicyError
 from unconstrain.policies.base import Policy
 from unconstrain.selection import Row, Table, select_policy
 
+NOTICEABLE = 0.01
+"""A held-out error that is lower by less than this share is called no better: rounding reaches so far."""
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -41,6 +44,11 @@ class Comparison:
     other_risk: str
     measure: str
     chosen: Table | None = None
+
+    @property
+    def is_beaten(self) -> bool:
+        """Whether the other risk's held-out error is lower, by more than `NOTICEABLE`."""
+        return self.other.inconsistency < (1.0 - NOTICEABLE) * self.kept.inconsistency
 
     def by_risk(self) -> dict[str, Row]:
         """Return both rows by their risk, ordinary regression last."""

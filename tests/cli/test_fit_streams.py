@@ -28,6 +28,7 @@ def test_a_folder_is_read_as_a_stream(run, folder):
     assert code == 0, err
     assert f"read: {len(X)} samples in {len(np.unique(EPISODES))} episodes" in out
     assert "of observed motion explained" in out
+    assert "not compared with ordinary regression" in out
     assert f"{len(X)} of {len(X)} rows" in err
     assert_same_fit(
         uc.load_policy("policy.skops"), uc.ParametricPolicy(alpha="cv").fit(X, U, groups=EPISODES)

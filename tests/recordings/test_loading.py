@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.recordings import load
+from unconstrain.recordings import open as open_recordings
 
 RECORDED = Path(__file__).resolve().parents[2] / ".." / "shared" / "data"
 recorded = pytest.mark.skipif(not RECORDED.is_dir(), reason="the recorded data are not beside the project")
@@ -92,6 +93,18 @@ def test_text_as_it_comes(tmp_path, text):
     demos = load(written(tmp_path / "a.csv", text), state="x", action="u")
     assert demos.states.tolist() == [[1.5], [2.5]]
     assert demos.actions.tolist() == [[2.0], [3.0]]
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_decimal_comma_is_told(tmp_path, mark):
+    # It may have been meant to set off thousands.
+    path = written(tmp_path / "a.csv", f"x{mark}u\n1,500{mark}2\n2,250{mark}3\n")
+    demos = load(path, state="x", action="u")
+    assert demos.states.tolist() == [[1.5], [2.25]]
+    assert demos.notes == ("a.csv: commas in numbers are read as decimal marks",)
+    recordings = open_recordings(path, state="x", action="u")
+    assert sum(len(block) for block in recordings.blocks(1)) == 2
+    assert tuple(map(str, recordings.notes)) == demos.notes
 
 
 def test_the_header_of_unnamed_pandas_columns(tmp_path):

@@ -95,6 +95,10 @@ def fit(
         policy.recording_ = recorded.kept()
         policy.save(out, resumable=resumable)
         reporting.say(describe_fit(policy))
+        reporting.say(
+            "not compared with ordinary regression, as this was a stream: to compare, fit with `--risk direct` too, "
+            "and `unconstrain evaluate` both"
+        )
         recordings.describe_notes(opened.notes)
         _suggest(out)
         return
@@ -158,6 +162,12 @@ def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
             for risk, row in comparison.by_risk().items()
         ],
     )
+    if comparison.is_beaten:
+        rival = "ordinary regression" if comparison.other_risk == "direct" else "inconsistency"
+        reporting.say(
+            f"warning: the policy learnt by {rival} is better by this measure than the one that is saved; "
+            f"`--risk {comparison.other_risk}` saves it instead"
+        )
     report = identifiability(policy, demos.states, demos.actions, projections=demos.projections)
     if 1.0 - report.determined_share >= WORTH_A_WARNING:
         reporting.say(

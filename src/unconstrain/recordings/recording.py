@@ -23,7 +23,7 @@ from unconstrain.recordings.blocks import (
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.derivative import differentiate, spans_window
 from unconstrain.recordings.files import label as label_files
-from unconstrain.recordings.formats.base import ColumnKey, Declared, Format
+from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared, Format
 from unconstrain.recordings.gaps import GAP_STEPS, SUSPICIOUS, Fragments, split
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.pieces import (
@@ -298,6 +298,9 @@ class Recording:
     def _load(self, pieces: Sequence[Piece], start: int, everything: bool) -> Loaded:
         prepares = everything or self.whole_episodes_for is not None
         loaded = self._prepare(pieces, start, everything) if prepares else Loaded(self._take(pieces, start))
+        guesses = {(piece.rows.schema.metadata or {}).get(GUESS) for piece in pieces} - {None}
+        notes = (Note("guess", self.name, guess.decode()) for guess in sorted(guesses))
+        loaded = replace(loaded, notes=(*notes, *loaded.notes))
         least = self.preparation.min_speed
         if least is not None:
             return leave_out_slow(loaded, least)

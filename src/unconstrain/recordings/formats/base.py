@@ -15,6 +15,9 @@ from unconstrain.recordings.table import Header
 ColumnKey = tuple[str, int]
 """A column's name, and which of the columns of that name it is, from 0."""
 
+GUESS = b"guess"
+"""Where, in the schema's metadata of the rows that it reads, a format says what it guessed of them."""
+
 
 @dataclass(frozen=True)
 class Declared:
@@ -85,7 +88,10 @@ class Format(Protocol):
     def read(
         self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
     ) -> Iterator[tuple[int, pa.RecordBatch]]:
-        """Read rows `start` to `stop` of these columns, in order, some at a time, each with its first row."""
+        """Read rows `start` to `stop` of these columns, in order, some at a time, each with its first row.
+
+        What had to be guessed stands in the metadata of their schema, under `GUESS`, and becomes a note.
+        """
         ...
 
     def place(self, index: int) -> str:

@@ -14,7 +14,7 @@ import pyarrow.csv
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import ColumnKey, Declared
+from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared
 from unconstrain.recordings.table import Column, Header
 
 BOM = b"\xef\xbb\xbf"
@@ -127,9 +127,13 @@ class Text:
         except pa.ArrowInvalid as error:
             raise _ragged(data, delimiter, len(names), self.file.shown, error) from error
         found = [table.column(unique[i]).combine_chunks() for i in at]
+        guess = None
         if delimiter in "\t;":
-            found = [pc.replace_substring_regex(column, DECIMAL_COMMA, r"\1.\2") for column in found]
-        return pa.RecordBatch.from_arrays(found, names=[name for name, _ in columns])
+            given = found
+            found = [pc.replace_substring_regex(column, DECIMAL_COMMA, r"\1.\2") for column in given]
+            if any(not a.equals(b) for a, b in zip(given, found, strict=True)):
+                guess = {GUESS: "commas in numbers are read as decimal marks"}
+        return pa.RecordBatch.from_arrays(found, names=[name for name, _ in columns], metadata=guess)
 
 
 class _Layout(NamedTuple):

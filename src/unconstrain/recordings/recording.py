@@ -298,7 +298,9 @@ class Recording:
     def _load(self, pieces: Sequence[Piece], start: int, everything: bool) -> Loaded:
         prepares = everything or self.whole_episodes_for is not None
         loaded = self._prepare(pieces, start, everything) if prepares else Loaded(self._take(pieces, start))
-        guesses = {(piece.rows.schema.metadata or {}).get(GUESS) for piece in pieces} - {None}
+        guesses: set[bytes] = {
+            metadata[GUESS] for piece in pieces if GUESS in (metadata := piece.rows.schema.metadata or {})
+        }
         notes = (Note("guess", self.name, guess.decode()) for guess in sorted(guesses))
         loaded = replace(loaded, notes=(*notes, *loaded.notes))
         least = self.preparation.min_speed

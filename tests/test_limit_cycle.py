@@ -55,6 +55,25 @@ def test_without_constraints_the_policy_itself_is_seen():
     np.testing.assert_array_equal(demos.actions, demos.policy)
 
 
+def test_a_share_of_the_segments_is_free():
+    papers, mixed = demonstrate(400, random_state=3), demonstrate(400, free=0.3, random_state=3)
+    ranks = np.trace(mixed.projections, axis1=1, axis2=2).round().reshape(400, 40)
+    np.testing.assert_allclose(np.mean(ranks == 2), 0.3, atol=0.04)
+    changes = np.flatnonzero(np.any(np.diff(ranks, axis=1), axis=0)) + 1
+    np.testing.assert_array_equal(changes, [14, 27], "only where a constraint would be drawn anew")
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", mixed.projections, mixed.policy), mixed.actions)
+    constrained = ranks.ravel() == 1
+    np.testing.assert_array_equal(mixed.projections[constrained], papers.projections[constrained])
+
+
+def test_no_share_or_all_of_it_is_what_it_was_before():
+    for free, constrained in ((0.0, True), (1.0, False)):
+        given = demonstrate(5, free=free, random_state=4)
+        np.testing.assert_array_equal(
+            given.actions, demonstrate(5, constrained=constrained, random_state=4).actions
+        )
+
+
 def test_the_same_random_state_gives_the_same_data():
     np.testing.assert_array_equal(
         demonstrate(3, random_state=7).actions, demonstrate(3, random_state=7).actions
@@ -68,6 +87,7 @@ def test_the_same_random_state_gives_the_same_data():
         (UnconstrainError, lambda: demonstrate(0), "at least one episode"),
         (UnconstrainError, lambda: demonstrate(rate=-1), "positive rate"),
         (UnconstrainError, lambda: demonstrate(noise=-0.1), "0 or more, not -0.1"),
+        (UnconstrainError, lambda: demonstrate(free=1.1), "0 to 1, not 1.1"),
         (DataError, lambda: LimitCycle()(np.zeros((2, 3))), r"shape \(N, 2\)"),
     ],
 )

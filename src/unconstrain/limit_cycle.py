@@ -52,12 +52,14 @@ def demonstrate(
     *,
     policy: LimitCycle | None = None,
     constrained: bool = True,
+    free: float = 0.0,
     random_state: int | np.random.Generator | None = None,
 ) -> Demonstrations:
     """Simulate movements of the limit cycle, each under three random constraints, one after the other.
 
     Starts are uniform in [-1, 1]². The constraint ``A = (α1, α2)``, ``α ~ N(0, 1)``, is drawn anew in each
-    third of a trajectory; the action is ``u = N π(x)`` and the state moves by ``u / rate``.
+    third of a trajectory; the action is ``u = N π(x)`` and the state moves by ``u / rate``. With `free`, some of
+    these thirds have no constraint.
 
     Parameters
     ----------
@@ -73,6 +75,9 @@ def demonstrate(
         By default that of the paper, ρ = 0.5, ω = 1.
     constrained : bool
         If false, nothing stands in the way and ``u = π(x)``.
+    free : float
+        The probability that a third of a trajectory has no constraint, so that N = I there; each is drawn by itself.
+        With 0 no random numbers are spent on it: the data are those of a call without `free`.
     random_state : int, Generator or None
         The same number gives the same data.
 
@@ -84,7 +89,8 @@ def demonstrate(
     Raises
     ------
     UnconstrainError
-        If a number is not positive, the noise is negative, or the samples do not fit into memory.
+        If a number is not positive, the noise is negative, `free` is no probability, or the samples do not fit into
+        memory.
     """
     if n_episodes < 1 or length < 1 or not (np.isfinite(rate) and rate > 0):
         raise UnconstrainError(
@@ -93,6 +99,8 @@ def demonstrate(
         )
     if not (np.isfinite(noise) and noise >= 0):
         raise UnconstrainError(f"the noise is a share of the actions' scale, 0 or more, not {noise}")
+    if not 0.0 <= free <= 1.0:
+        raise UnconstrainError(f"free is the share of constraints that are left out, 0 to 1, not {free}")
     check_size(n_episodes, length, 2, 2, constrained=True)
     rng = np.random.default_rng(random_state)
     policy = policy or LimitCycle()
@@ -100,6 +108,9 @@ def demonstrate(
     x = rng.uniform(-1.0, 1.0, (n_episodes, 2))
     A = rng.standard_normal((n_episodes, SEGMENTS, 1, 2))
     N = projection(A.reshape(-1, 1, 2)).reshape(n_episodes, SEGMENTS, 2, 2)
+    if free:
+        left_out = rng.random((n_episodes, SEGMENTS)) < free
+        N = np.where(left_out[:, :, None, None], unconstrained(2), N)
     if not constrained:
         N = np.broadcast_to(unconstrained(2), N.shape)
 

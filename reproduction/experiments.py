@@ -19,11 +19,12 @@ EXPERIMENTS = {
     "posture": "27 joints, and a wall in the way of the hands (Sec. IV-D).",
     "constraints": "Constraints learnt, measured and used.",
     "identifiability": "What recordings cannot tell.",
+    "adaptive": "Which samples were free, inferred.",
 }
 """In the order of the report."""
 
-RECORDED = ("constraints", "identifiability")
-"""Those that also look at recordings, where they are given."""
+RECORDED = {"constraints": "recordings", "identifiability": "recordings", "adaptive": "data"}
+"""Those that also look at recordings, where they are given, and the option that names their folder."""
 
 
 class Reproduce(Protocol):

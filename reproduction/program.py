@@ -133,6 +133,18 @@ _experiment(
 _experiment("posture", *RUNNING, *ROBOT)
 _experiment("constraints", *RUNNING, RECORDINGS)
 _experiment("identifiability", *RUNNING, RECORDINGS)
+_experiment(
+    "adaptive",
+    *RUNNING,
+    click.option(
+        "--data",
+        type=PATH,
+        metavar="DATA_FOLDER",
+        help="Folder of recordings: handwriting/*.mat, reaching/reaching_cluttered.mat, and the recorded surfaces; "
+        "without it those parts are left out.",
+    ),
+    click.option("--part", metavar="NAME", help="Only this part; a wrong name lists them."),
+)
 
 
 @click.command("all", cls=Command)

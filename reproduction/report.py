@@ -44,7 +44,7 @@ def reproduce_all(
     console : Console
         Where progress is shown.
     recordings : Path, optional
-        The folder of the recorded surfaces.
+        The folder of the recorded surfaces, and perhaps of what else `adaptive` looks at.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def reproduce_all(
     outcomes, missing = [], {}
     for name in EXPERIMENTS:
         console.rule(name)
-        options = {"recordings": recordings} if name in RECORDED else {}
+        options = {RECORDED[name]: recordings} if name in RECORDED else {}
         try:
             outcomes.append(
                 find_experiment(name)(out / name, trials=trials, jobs=jobs, console=console, **options)

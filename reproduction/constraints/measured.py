@@ -1,8 +1,10 @@
 """One data set of constraints that are measured: what knowing them is worth."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reproduction.arm.trial import make_candidates
 from reproduction.constraints.trial import SETTINGS
@@ -11,6 +13,7 @@ from reproduction.plants import arm, arm_dynamics, arm_stage
 from reproduction.plants.robot_choice import OUR_OWN
 from reproduction.scores import nupe
 from unconstrain.constraints import from_forces
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.selection import select_policy
 
@@ -35,12 +38,33 @@ def run_measured(seed: int) -> dict[str, Any]:
     return {"arm": _run_arm(seed), "grasp": _run_grasp(seed)}
 
 
-def _run_arm(seed: int) -> dict[str, Any]:
-    """Measure nUPE on new starts, by inconsistency and with the constraints read off a noisy force sensor."""
+@dataclass(frozen=True)
+class Sliding:
+    """Movements of the arm in physics over tables, and what a force sensor says of the constraints.
+
+    Attributes
+    ----------
+    train, test : Demonstrations
+        Recorded; movements to learn from, and others from new starts.
+    known : ndarray of shape (N, 7, 7)
+        Projections of the samples learnt from, read off the sensor; NaN around landings.
+    ideal : ndarray of shape (N, 7)
+        The actions `N π` of the ideal constraint at the samples learnt from.
+    unknown : float
+        Share of the samples, those to test on among them, whose projection the sensor leaves unknown.
+    """
+
+    train: Demonstrations
+    test: Demonstrations
+    known: NDArray[np.float64]
+    ideal: NDArray[np.float64]
+    unknown: float
+
+
+def record_sliding(seed: int, episodes: int = PHYSICS_EPISODES, new: int = PHYSICS_NEW) -> Sliding:
+    """Record a data set of the arm sliding on tables, with a noisy force sensor."""
     policy = arm.PowerPolicy(1.8, 0.5)
-    recording = arm_dynamics.demonstrate(
-        arm_stage.TABLE, policy, PHYSICS_EPISODES + PHYSICS_NEW, random_state=seed
-    )
+    recording = arm_dynamics.demonstrate(arm_stage.TABLE, policy, episodes + new, random_state=seed)
     D, rng = recording.demonstrations, np.random.default_rng([seed, 3])
     forces = recording.contact_force + SENSOR_NOISE * rng.normal(size=recording.contact_force.shape)
     robot = arm_stage.stage(arm_stage.TABLE)
@@ -52,10 +76,22 @@ def _run_arm(seed: int) -> dict[str, Any]:
         margin=MARGIN,
         episodes=D.episodes,
     )
-    learnt_from = D.episodes < PHYSICS_EPISODES
-    train, test = D.select(learnt_from), D.select(~learnt_from)
-    result: dict[str, Any] = {"unknown": float(np.mean(np.isnan(N[:, 0, 0])))}
-    for name, known in (("inconsistency", None), ("forces", N[learnt_from])):
+    learnt_from = D.episodes < episodes
+    return Sliding(
+        D.select(learnt_from),
+        D.select(~learnt_from),
+        N[learnt_from],
+        recording.ideal[learnt_from],
+        unknown=float(np.mean(np.isnan(N[:, 0, 0]))),
+    )
+
+
+def _run_arm(seed: int) -> dict[str, Any]:
+    """Measure nUPE on new starts, by inconsistency and with the constraints read off a noisy force sensor."""
+    recorded = record_sliding(seed)
+    train, test = recorded.train, recorded.test
+    result: dict[str, Any] = {"unknown": recorded.unknown}
+    for name, known in (("inconsistency", None), ("forces", recorded.known)):
         found = select_policy(
             make_candidates(),
             train.states,
@@ -70,13 +106,24 @@ def _run_arm(seed: int) -> dict[str, Any]:
     return result
 
 
+def record_grasps(seed: int, grasps: int = GRASPS) -> tuple[Demonstrations, Demonstrations]:
+    """Record ten grasps of the humanoid to learn from, and ten others to test on."""
+    demonstrator, rng = make_demonstrator(OUR_OWN), np.random.default_rng(seed)
+    train, test = (record_training(demonstrator, rng, grasps)[0].demonstrations for _ in range(2))
+    return train, test
+
+
+def make_grasp_model() -> LocallyLinearPolicy:
+    """Make the few local models that ten grasps suffice for."""
+    return LocallyLinearPolicy(centers="kmeans", n_centers=GRASP_MODELS, alpha="cv")
+
+
 def _run_grasp(seed: int) -> dict[str, float]:
     """Measure nUPE on other movements after ten grasps, by inconsistency and with the true projections."""
-    demonstrator, rng = make_demonstrator(OUR_OWN), np.random.default_rng(seed)
-    train, test = (record_training(demonstrator, rng, GRASPS)[0].demonstrations for _ in range(2))
+    train, test = record_grasps(seed)
     result = {}
     for name, N in (("inconsistency", None), ("projections", train.projections)):
-        policy = LocallyLinearPolicy(centers="kmeans", n_centers=GRASP_MODELS, alpha="cv")
+        policy = make_grasp_model()
         policy.fit(train.states, train.actions, groups=train.episodes, projections=N)
         result[name] = nupe(test, policy.predict(test.states))
     return result

@@ -107,8 +107,7 @@ def run_trial(
     """
     demonstrator, rng = make_demonstrator(choice), np.random.default_rng(seed)
     held_out = max(2, round(HELD_OUT * n_episodes))
-    train, _ = record_training(demonstrator, rng, n_episodes, duration)
-    test, _ = record_training(demonstrator, rng, held_out, duration)
+    train, test = record_both(demonstrator, rng, n_episodes, duration)
     barred = demonstrator.scene.central(held_out)
     around = demonstrator.record(barred, demonstrator.draw_starts(held_out, rng), duration=duration)
     free = demonstrator.record(None, demonstrator.draw_starts(held_out, rng), duration=duration)
@@ -142,6 +141,15 @@ def record_training(
     rng = np.random.default_rng(random_state)
     obstacle = demonstrator.scene.with_gap(rng.normal(GAP_MEAN, GAP_DEVIATION, n))
     return demonstrator.record(obstacle, demonstrator.draw_starts(n, rng), duration=duration), obstacle
+
+
+def record_both(
+    demonstrator: Demonstrator, rng: np.random.Generator, n: int = 100, duration: float = DURATION
+) -> tuple[Recording, Recording]:
+    """Record n movements to learn from, and a fifth as many to test on."""
+    train, _ = record_training(demonstrator, rng, n, duration)
+    test, _ = record_training(demonstrator, rng, max(2, round(HELD_OUT * n)), duration)
+    return train, test
 
 
 def collect(results: list[dict[str, Any]], risk: str, column: str) -> Array:

@@ -1,0 +1,1 @@
+"""Which samples were free is inferred, not told: measured on everything this project has data of."""

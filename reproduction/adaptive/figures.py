@@ -65,7 +65,7 @@ def plot_contact(demos: Demonstrations, free: NDArray[np.bool_], inferred: NDArr
             x, y = demos.states[:, 3 * hand], demos.states[:, 3 * hand + 1]
             points = ax.scatter(y, x, c=shown, s=5, cmap="cividis", vmin=0.0, vmax=1.0, linewidths=0)
         ax.set(title=title, ylabel="x / m")
-        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_aspect("equal")
         ax.grid(alpha=0.25)
     panels[1].set_xlabel("y / m")
     figure.colorbar(points, ax=panels, shrink=0.6, label="probability that the barrier blocks a hand")

@@ -85,11 +85,12 @@ def load_demonstrations(path: Path, listed: str, transposed: bool) -> list[tuple
         It is no such file.
     """
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         found: Any = loadmat(path, simplify_cells=True)[listed]
         pairs = [[np.asarray(one[key], dtype=np.float64) for key in ("pos", "vel")] for one in found]
-    except (OSError, ValueError, KeyError, TypeError, NotImplementedError) as error:
+    except (OSError, MatReadError, ValueError, KeyError, TypeError, NotImplementedError) as error:
         raise UnconstrainError(
             f"{path} cannot be read as MATLAB's list {listed!r} of pos and vel: {error}"
         ) from error

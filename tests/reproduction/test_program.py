@@ -50,7 +50,18 @@ def test_results_go_where_they_are_told_to(program, tmp_path):
 def test_help_lists_the_experiments_and_their_own_options(program):
     code, out, _ = program()
     assert code == 0
-    for name in ("toy", "finger", "arm", "grasp", "posture", "constraints", "identifiability", "all", "view"):
+    for name in (
+        "toy",
+        "finger",
+        "arm",
+        "grasp",
+        "posture",
+        "constraints",
+        "identifiability",
+        "adaptive",
+        "all",
+        "view",
+    ):
         assert f"\n  {name} " in out
     assert "--physics" in program("arm", "--help")[1]
     assert "--physics" not in program("toy", "--help")[1]
@@ -74,6 +85,9 @@ def test_help_lists_the_experiments_and_their_own_options(program):
         (["posture", "--video", "a.mp4"], "No such option '--video'"),
         (["constraints", "--recordings", "."], "as --recordings"),
         (["identifiability", "--recordings", "nowhere"], "there is no recording nowhere/planer_circle.csv"),
+        (["adaptive", "--data", "nowhere"], "there is no folder nowhere: give the folder"),
+        (["adaptive", "--part", "toy"], "there is no part 'toy': choose one of cycle, cycle400"),
+        (["adaptive", "--part", "handwriting"], "'handwriting' cannot be run: give the folder"),
     ],
 )
 def test_a_mistake_is_one_sentence_and_exit_code_2(program, tmp_path, arguments, sentence):

@@ -61,7 +61,8 @@ def test_what_cannot_run_is_left_out_and_recordings_go_to_those_that_look_at_the
     )
     assert "## arm\n\nLeft out: the arm is not here" in page.read_text()
     assert "python -m reproduction all --recordings FOLDER --trials 2" in page.read_text()
-    assert {name for name, options in asked.items() if options == {"recordings": tmp_path}} == {
-        *report.RECORDED
+    assert {name: [*options] for name, options in asked.items() if options} == {
+        name: [option] for name, option in report.RECORDED.items()
     }
+    assert asked["adaptive"] == {"data": tmp_path}
     assert asked["toy"] == {}

@@ -10,8 +10,9 @@ With Gaussian noise of variance σ² on the actions, a sample informs about the 
 
 with the clean action u. The second is the gradient of the distance of u from the sphere with diameter π, on which all
 `N π` lie: `δ = ‖u - π/2‖ - ‖π‖/2`, `∂δ/∂π = -(‖u‖ / ‖π‖) û`. For a policy `π = Φ w` the parameters' covariance is at
-least `(Σ ΦᵀQΦ / σ² + I / v)⁻¹`, the error at other states the trace of that behind Φ. The prior variance v is such
-that the policies of the prior are as large as the true one; where the data determine the policy it does not matter.
+least `(Σ ΦᵀQΦ / σ² + I / v)⁻¹`, the error at other states the trace of that behind Φ. Without a prior (v infinite)
+features that overlap would have an error of any size. Its variance v is the most probable one of the true policy's own
+parameters, if all of it were seen through the same noise (MacKay): smooth policies may need large parameters.
 
 Local models are each fitted alone: each has a bound of its own, with its samples weighted by its receptive field, and
 that of the blend is taken to be the blend of theirs. That is no theorem; the ratio of two such bounds is still what
@@ -28,10 +29,13 @@ from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.fitting.model import Model
-from unconstrain.fitting.observation import Projected
+from unconstrain.fitting.observation import Projected, observe
 from unconstrain.fitting.posterior import Posterior
 
 Array = NDArray[np.float64]
+
+ROUNDS = 100
+"""Of expectation and maximisation; v enters through `σ² / v` alone, and need not be exact."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,7 @@ def compute_bounds(model: Model, clean: Demonstrations, test: Demonstrations, no
     assert clean.policy is not None
     assert clean.projections is not None
     assert test.policy is not None
-    prior = float(clean.policy.var(axis=0).sum()) / _error(model, clean.states, _identity(model, clean))
+    prior = find_prior_variance(model, clean.states, clean.policy, noise)
     variance = float(test.policy.var(axis=0).sum())
     unknown, told = (
         _error(model, test.states, _covariance(model, clean.states, rows, noise, prior)) / variance
@@ -103,18 +107,43 @@ def compute_bounds(model: Model, clean: Demonstrations, test: Demonstrations, no
     return Bounds(unknown, told)
 
 
-def _covariance(model: Model, X: Array, rows: Array, noise: float, prior: float) -> Array:
+def find_prior_variance(model: Model, X: Array, Pi: Array, noise: float) -> Array:
+    """Find the most probable variance of a policy's parameters, that of each of S models by itself.
+
+    Parameters
+    ----------
+    model : Model
+        Fitted features.
+    X : ndarray of shape (N, n)
+        States.
+    Pi : ndarray of shape (N, d)
+        The policy there.
+    noise : float
+        Standard deviation σ of the noise that it is seen through.
+
+    Returns
+    -------
+    ndarray of shape () or (S,)
+        v, of largest evidence, by expectation and maximisation.
+    """
+    moments = model.moments(X, observe("direct", Pi))
+    values, vectors = np.linalg.eigh(moments.H)
+    targets = moments.g.shape[-1]
+    # Sums over the targets that share a basis, along each eigenvector.
+    squares = np.sum((vectors.swapaxes(-1, -2) @ moments.g) ** 2, axis=-1) / noise**4
+    precision = np.maximum(values, 0.0) / noise**2
+    v = np.mean(squares / (precision + precision.max(axis=-1, keepdims=True)) ** 2, axis=-1)
+    for _ in range(ROUNDS):
+        sharpness = precision + 1 / v[..., None]
+        v = np.mean(squares / sharpness**2 / targets + 1 / sharpness, axis=-1)
+    return v
+
+
+def _covariance(model: Model, X: Array, rows: Array, noise: float, prior: Array) -> Array:
     """Compute the least covariance of the parameters, (P, P), or (S, P, P) of S local models."""
     H = model.moments(X, Projected(rows, np.zeros(rows.shape[:2]))).H
-    inverse = np.linalg.inv(H + noise**2 / prior * np.eye(H.shape[-1]))
+    inverse = np.linalg.inv(H + (noise**2 / prior)[..., None, None] * np.eye(H.shape[-1]))
     return noise**2 * (inverse + inverse.swapaxes(-1, -2)) / 2
-
-
-def _identity(model: Model, clean: Demonstrations) -> Array:
-    """Make the covariance of parameters that are independent and of variance 1."""
-    some = np.zeros((1, *clean.actions.shape[1:] * 2))
-    shape = model.moments(clean.states[:1], Projected(some, some[:, 0])).H.shape
-    return np.broadcast_to(np.eye(shape[-1]), shape)
 
 
 def _error(model: Model, X: Array, covariance: Array) -> float:

@@ -35,8 +35,10 @@ CHOICES = (
     "Told: the same model and the same noisy data, by inconsistency with the true projection of every sample known, "
     "N = I for free ones.",
     "Bound: Cramér and Rao's, for the features of the model and clean actions. A constrained sample whose projection "
-    "is not known informs by (‖u‖²/‖π‖²) û ûᵀ/σ², a free one by I/σ², one that is told by N/σ². The prior is as large "
-    f"as the policy. Without noise it is that of {LEAST_NOISE:.1%} noise. Local models are taken one by one.",
+    "is not known informs by (‖u‖²/‖π‖²) û ûᵀ/σ², a free one by I/σ², one that is told by N/σ². The prior variance is "
+    "the most probable one of the true policy's parameters, seen through the same noise. Without noise the bound is "
+    f"that of {LEAST_NOISE:.1%} noise. Local models are taken one by one. In physics σ is what recorded actions differ "
+    "from N π by.",
     "“told + bound” is told's error with its part from noise exchanged for that of the bound: what can be hoped for "
     "where the model's misfit is larger than the noise, of which the bound knows nothing.",
     f"The projections determine a policy where they do {DETERMINED:.0%} of its directions (`identifiability`); errors "

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 from scipy.io import savemat
+from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from reproduction.adaptive import (
@@ -20,7 +21,7 @@ from reproduction.adaptive import (
     tables,
     ways,
 )
-from reproduction.adaptive.bound import compute_bounds, informative_rows, is_free
+from reproduction.adaptive.bound import compute_bounds, find_prior_variance, informative_rows, is_free
 from reproduction.adaptive.judgement import judge
 from reproduction.adaptive.settings import Part, Reach
 from reproduction.adaptive.ways import ADAPTIVE, DIRECT, INCONSISTENCY, TOLD
@@ -91,20 +92,47 @@ def test_a_constrained_sample_informs_by_the_gradient_of_its_distance_from_the_s
     assert is_free(np.array([np.eye(3), np.diag([1.0, 1, 0])])).tolist() == [True, False]
 
 
-def test_told_reaches_its_bound_on_average_and_unknown_is_never_below():
-    data, test = _line_data(), _line_data(seed=1)
-    rng, errors, sigma = np.random.default_rng(2), [], 0.2
-    policy = ParametricPolicy(alpha=1e-9)
-    for _ in range(200):
+def test_both_bounds_are_reached_on_average():
+    """Told's by least squares; the other's by least distances from spheres and poles, free samples recognised."""
+    data, test, sigma = _line_data(), _line_data(seed=1), 0.02
+    rng, policy, free = np.random.default_rng(2), ParametricPolicy(alpha=1e-9), is_free(data.projections)
+    B, B_test = (np.column_stack([D.states, np.ones(len(D))]) for D in (data, test))
+    true = np.linalg.lstsq(B, data.policy)[0]
+
+    def misses(w, U):
+        P = B @ w.reshape(true.shape)
+        spheres = np.linalg.norm(U - P / 2, axis=1) - np.linalg.norm(P, axis=1) / 2
+        return np.concatenate([spheres[~free], (U - P)[free].ravel()])
+
+    told, unknown = [], []
+    for _ in range(60):
         U = data.actions + sigma * rng.normal(size=data.actions.shape)
         policy.fit(data.states, U, projections=data.projections)
-        errors.append(metrics.unconstrained_policy_error(test.policy, policy.predict(test.states)))
-    bounds = compute_bounds(policy.model_, data, test, sigma)
-    assert bounds.told == pytest.approx(np.mean(errors) / test.policy.var(axis=0).sum(), rel=0.15)
-    assert bounds.unknown > bounds.told
+        told.append(metrics.unconstrained_policy_error(test.policy, policy.predict(test.states)))
+        w = least_squares(misses, true.ravel(), args=(U,)).x
+        unknown.append(metrics.unconstrained_policy_error(test.policy, B_test @ w.reshape(true.shape)))
+    bounds, variance = compute_bounds(policy.model_, data, test, sigma), test.policy.var(axis=0).sum()
+    assert bounds.told == pytest.approx(np.mean(told) / variance, rel=0.2)
+    assert bounds.unknown == pytest.approx(np.mean(unknown) / variance, rel=0.2)
+    assert bounds.unknown > 1.2 * bounds.told
+
+
+def test_where_everything_is_free_there_is_nothing_to_tell():
+    data, test = _line_data(), _line_data(seed=1)
     everything = replace(data, actions=data.policy, projections=np.broadcast_to(np.eye(3), (len(data), 3, 3)))
-    free = compute_bounds(policy.model_, everything, test, sigma)
-    assert free.unknown == free.told < bounds.told
+    model = ParametricPolicy().fit(data.states, data.policy).model_
+    free, some = (compute_bounds(model, each, test, 0.1) for each in (everything, data))
+    assert free.unknown == free.told < some.told
+
+
+def test_the_prior_is_as_wide_as_the_policy_s_parameters():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(300, 30))
+    model = ParametricPolicy().fit(X, X).model_
+    for deviation in (0.1, 10.0):
+        Pi = np.column_stack([X, np.ones(300)]) @ (deviation * rng.normal(size=(31, 30)))
+        v = find_prior_variance(model, X, Pi, 1e-3)
+        assert v == pytest.approx(deviation**2, rel=0.2)
 
 
 def test_bounds_are_there_for_every_model():

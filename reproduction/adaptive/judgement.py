@@ -70,7 +70,7 @@ class Verdict:
             return ""
         if self.reached:
             return "yes, weak" if self.weak else "yes"
-        return "no, below the bound" if self.impossible else "no"
+        return "no"
 
 
 def judge(cell: Cell, reach: Reach) -> Verdict:
@@ -80,18 +80,21 @@ def judge(cell: Cell, reach: Reach) -> Verdict:
         return Verdict("≥ both others", cell[ADAPTIVE] >= others if ADAPTIVE in cell else None)
     limits = _list_limits(cell, reach)
     words = [f"≤ {words}" for words, _ in limits]
+    limit = max(min((limit for _, limit in limits), default=np.inf), EXACT)
+    impossible = has_noise(cell) and limit < cell["bound"]
+    if impossible:
+        words[int(np.argmin([limit for _, limit in limits]))] += " (below the bound)"
     if reach.contact is not None:
         words.append(f"contact ≥ {100 * reach.contact:g} %")
     if not words or ADAPTIVE not in cell:
-        return Verdict(", ".join(words), None)
-    limit = max(min((limit for _, limit in limits), default=np.inf), EXACT)
+        return Verdict(", ".join(words), None, impossible)
     reached = cell[ADAPTIVE] <= limit
     if reach.contact is not None:
         reached = reached and cell["contact right"] >= reach.contact
     return Verdict(
         ", ".join(words),
         bool(reached),
-        impossible=has_noise(cell) and limit < cell["bound"],
+        impossible,
         weak=limit >= min(cell[DIRECT], cell[INCONSISTENCY]) > EXACT
         and reach.best is None
         and reach.direct is None,

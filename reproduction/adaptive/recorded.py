@@ -59,7 +59,7 @@ def find_missing(part: str, folder: Path) -> str | None:
         "reaching": str(REACHING),
         "surfaces": f"{FLAT} and {CURVED}",
     }
-    return f"{names[part]} is not in {folder}"
+    return f"{folder} does not hold {names[part]}"
 
 
 def load_demonstrations(path: Path, listed: str, transposed: bool) -> list[tuple[Array, Array]]:

@@ -223,7 +223,7 @@ CELL |= {"bound": 0.02, "told bound": 0.01, "true noise": 0.1, "determined": 1.0
     [
         ({}, Reach(told=1.6), "≤ 1.6 x told", "yes"),
         ({}, Reach(told=1.4), "≤ 1.4 x told", "no"),
-        ({"bound": 0.04}, Reach(told=1.4), "≤ 1.4 x told", "no, below the bound"),
+        ({"bound": 0.04}, Reach(told=1.4), "≤ 1.4 x told (below the bound)", "no"),
         ({"bound": 0.04, "true noise": 0.0}, Reach(told=1.4), "≤ 1.4 x told", "no"),
         ({}, Reach(bound=1.3), "≤ 1.3 x bound x told", "yes"),
         ({"determined": 0.9}, Reach(bound=1.3), "", ""),
@@ -233,7 +233,7 @@ CELL |= {"bound": 0.02, "told bound": 0.01, "true noise": 0.1, "determined": 1.0
         ({}, Reach(told=2, contact=0.97), "≤ 2 x told, contact ≥ 97 %", "yes"),
         ({}, Reach(told=2, contact=0.99), "≤ 2 x told, contact ≥ 99 %", "no"),
         ({}, Reach(), "", ""),
-        ({ADAPTIVE: 1e-12, TOLD: 1e-16}, Reach(told=2), "≤ 2 x told", "yes"),
+        ({ADAPTIVE: 1e-12, TOLD: 1e-16, "true noise": 0.0}, Reach(told=2), "≤ 2 x told", "yes"),
         ({ADAPTIVE: 1.1}, Reach(likelihood=True), "≥ both others", "yes"),
         ({ADAPTIVE: 0.9}, Reach(likelihood=True), "≥ both others", "no"),
     ],
@@ -378,7 +378,7 @@ def test_the_experiment_goes_on_and_says_what_is_left_out(tmp_path, monkeypatch,
     assert "| Line |" in outcome.table
     left_out = [sentence for sentence in outcome.findings if "left out" in sentence]
     assert len(left_out) == 1
-    assert "planer_circle.csv and curve_circle.csv is not in" in left_out[0]
+    assert "does not hold planer_circle.csv and curve_circle.csv" in left_out[0]
     assert all(path.stat().st_size > 1000 for path in outcome.figures)
     assert set(json.loads((tmp_path / "out" / "trials.json").read_text())) == {"cycle", "handwriting"}
     monkeypatch.setattr(simulated, "compare_ways", None)
@@ -395,7 +395,7 @@ def test_one_part_alone_must_have_what_it_needs(tmp_path):
     for options, sentence in (
         ({"part": "toy"}, "no part 'toy': choose one of cycle, cycle400, arm"),
         ({"part": "handwriting"}, "give the folder of recordings as --data"),
-        ({"part": "reaching", "data": tmp_path}, "reaching_cluttered.mat is not in"),
+        ({"part": "reaching", "data": tmp_path}, "does not hold reaching/reaching_cluttered.mat"),
         ({"data": tmp_path / "nowhere"}, "there is no folder"),
     ):
         with pytest.raises(UnconstrainError, match=sentence):

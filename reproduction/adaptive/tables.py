@@ -31,10 +31,9 @@ def write_part(part: Part, results: Sequence[Result]) -> str:
         ["", *shown], [[name, *(row.get(c, "") for c in shown)] for name, row in rows.items()]
     )
     many = "splits" if part.fixed else "data sets"
-    mean = "" if len(results) == 1 else f"Means over {len(results)} {many}: "
+    mean = "Measured: " if len(results) == 1 else f"Means over {len(results)} {many}: "
     told = f" Told: {part.told}." if any(TOLD in cell for cell in means.values()) else ""
-    first = part.measure[0] if mean else part.measure[0].upper()
-    below = f"{mean}{first}{part.measure[1:]}.{told}"
+    below = f"{mean}{part.measure}.{told}"
     return f"### {part.title}\n\n{table}\n\n{below}\n"
 
 

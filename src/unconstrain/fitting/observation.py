@@ -30,6 +30,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.motion import NO_MOTION, lengths
 
 RISKS = ("inconsistency", "direct")
@@ -44,8 +45,13 @@ class Observation(Protocol):
         ...
 
     @property
-    def targets(self) -> np.ndarray:
-        """`Q u`, (N, k)."""
+    def row_weights(self) -> np.ndarray | None:
+        """What each row's square counts, (N, k); None stands for 1, and then there are `targets`."""
+        ...
+
+    @property
+    def targets(self) -> np.ndarray | None:
+        """`Q u`, (N, k); None where only `pulls` are known."""
         ...
 
     @property
@@ -66,6 +72,28 @@ class Observation(Protocol):
     @property
     def n_rows(self) -> int:
         """The number of rows of each `Q_n`, k."""
+        ...
+
+    @property
+    def pulls(self) -> np.ndarray:
+        """`QᵀQ u`, (N, d)."""
+        ...
+
+    def products(self, weights: np.ndarray | None = None, out: np.ndarray | None = None) -> np.ndarray:
+        """Compute the distinct entries of `ω QᵀQ`.
+
+        Parameters
+        ----------
+        weights : ndarray of shape (N,), optional
+            Weights ω, 1 by default.
+        out : ndarray of shape (d(d+1)/2, N), optional
+            Where they may be written.
+
+        Returns
+        -------
+        ndarray of shape (d(d+1)/2, N)
+            In the order of `products.pairs`.
+        """
         ...
 
     def __len__(self) -> int: ...
@@ -98,6 +126,11 @@ class Projected:
         return Projected(self.rows[index], self.targets[index], self.whole)
 
     @property
+    def row_weights(self) -> None:
+        """None: each row counts as it is."""
+        return
+
+    @property
     def n_actions(self) -> int:
         """The number of action dimensions, d."""
         return self.rows.shape[2]
@@ -111,6 +144,19 @@ class Projected:
     def squares(self) -> np.ndarray:
         """`‖Q u‖²` of each sample, (N,)."""
         return np.einsum("nk,nk->n", self.targets, self.targets)
+
+    @property
+    def pulls(self) -> np.ndarray:
+        """`QᵀQ u`, (N, d)."""
+        return self.targets if self.whole else np.einsum("nki,nk->ni", self.rows, self.targets)
+
+    def products(self, weights: np.ndarray | None = None, out: np.ndarray | None = None) -> np.ndarray:
+        """Compute the distinct entries of `ω QᵀQ`; see `Observation.products`."""
+        if self.n_rows == 1:
+            return distinct_products(self.rows[:, 0], weights, out)
+        i, j = pairs(self.n_actions)
+        products = np.einsum("nki,nkj->nij", self.rows, self.rows)[:, i, j].T
+        return products if weights is None else products * weights
 
 
 @dataclass(frozen=True)
@@ -155,6 +201,11 @@ class AlongMotion:
         return self.actions.shape[1]
 
     @property
+    def row_weights(self) -> None:
+        """None: each row counts as it is."""
+        return
+
+    @property
     def n_rows(self) -> int:
         """One: the direction."""
         return 1
@@ -174,6 +225,156 @@ class AlongMotion:
     def squares(self) -> np.ndarray:
         """`r²`, (N,)."""
         return self.lengths**2
+
+    @property
+    def pulls(self) -> np.ndarray:
+        """`û r`, (N, d)."""
+        return self.rows[:, 0] * self.targets
+
+    def products(self, weights: np.ndarray | None = None, out: np.ndarray | None = None) -> np.ndarray:
+        """Compute the distinct entries of `ω û ûᵀ`; see `Observation.products`."""
+        return distinct_products(self.rows[:, 0], weights, out)
+
+
+@dataclass(frozen=True)
+class Expanded:
+    """The observation of log-likelihoods that are expanded about predictions p, to second order.
+
+    `A = a (N - ââᵀ) + (a + b) ââᵀ + c n nᵀ` takes the place of `QᵀQ`, with N the identity where the projection is not
+    known, and `A p + g` that of `QᵀQ u`: the true action that would be best for one sample is not a number that there is
+    for every A.
+
+    Parameters
+    ----------
+    blunt, along, towards : ndarray of shape (N,)
+        a, b and c.
+    ahead, normal : ndarray of shape (N, d)
+        â, a unit vector or zero, and n.
+    pulls : ndarray of shape (N, d)
+        `A p + g`.
+    squares : ndarray of shape (N,)
+        What makes `s - 2 (A p + g)ᵀp' + p'ᵀA p'` the squared error at p.
+    known : ndarray of shape (N,), bool
+        Of which samples the projection is known.
+    projections : ndarray of shape (K, d, d)
+        The projections of these.
+    """
+
+    blunt: np.ndarray
+    along: np.ndarray
+    towards: np.ndarray
+    ahead: np.ndarray
+    normal: np.ndarray
+    pulls: np.ndarray
+    squares: np.ndarray
+    known: np.ndarray
+    projections: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        P: np.ndarray,
+        gradient: np.ndarray,
+        error: np.ndarray,
+        *parts: np.ndarray,
+        known: np.ndarray,
+        projections: np.ndarray,
+    ) -> "Expanded":
+        """Expand about predictions.
+
+        Parameters
+        ----------
+        P : ndarray of shape (N, d)
+            Predictions, behind the projections that are known.
+        gradient : ndarray of shape (N, d)
+            g.
+        error : ndarray of shape (N,)
+            Squared error at p.
+        *parts : ndarray
+            a, b, c, â and n.
+        known : ndarray of shape (N,), bool
+            Of which samples the projection is known.
+        projections : ndarray of shape (K, d, d)
+            The projections of these.
+
+        Returns
+        -------
+        Expanded
+            Of N samples.
+        """
+        blunt, along, towards, ahead, normal = parts
+        inside, across = np.einsum("nd,nd->n", ahead, P), np.einsum("nd,nd->n", normal, P)
+        AP = blunt[:, None] * P + (along * inside)[:, None] * ahead + (towards * across)[:, None] * normal
+        pulls = AP + gradient
+        squares = error + np.einsum("nd,nd->n", P, 2 * pulls - AP)
+        return cls(blunt, along, towards, ahead, normal, pulls, squares, known, projections)
+
+    def __len__(self) -> int:
+        return len(self.blunt)
+
+    def __getitem__(self, index: Any) -> "Expanded":
+        behind = np.cumsum(self.known) - 1
+        return Expanded(
+            self.blunt[index],
+            self.along[index],
+            self.towards[index],
+            self.ahead[index],
+            self.normal[index],
+            self.pulls[index],
+            self.squares[index],
+            self.known[index],
+            self.projections[behind[index][self.known[index]]],
+        )
+
+    @property
+    def whole(self) -> bool:
+        """False: what a sample says hangs on its direction."""
+        return False
+
+    @property
+    def n_actions(self) -> int:
+        """The number of action dimensions, d."""
+        return self.ahead.shape[1]
+
+    @property
+    def n_rows(self) -> int:
+        """Those of N, â and n: d + 2."""
+        return self.n_actions + 2
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Directions in which A weighs the policy, (N, d + 2, d)."""
+        N, d = self.ahead.shape
+        rows = np.empty((N, d + 2, d))
+        rows[:, :d] = np.eye(d)
+        rows[self.known, :d] = self.projections
+        rows[:, d], rows[:, d + 1] = self.ahead, self.normal
+        return rows
+
+    @property
+    def row_weights(self) -> np.ndarray:
+        """How much it weighs each of them, (N, d + 2); not all above zero."""
+        each = np.broadcast_to(self.blunt[:, None], self.ahead.shape)
+        return np.column_stack([each, self.along, self.towards])
+
+    @property
+    def targets(self) -> None:
+        """None: only `pulls` are known."""
+        return
+
+    def products(self, weights: np.ndarray | None = None, out: np.ndarray | None = None) -> np.ndarray:
+        """Compute the distinct entries of `ω A`; see `Observation.products`."""
+        i, j = pairs(self.n_actions)
+        products = distinct_products(self.normal, self.towards, out)
+        products += distinct_products(self.ahead, self.along)
+        products[i == j] += np.where(self.known, 0.0, self.blunt)
+        if len(self.projections):
+            products[:, self.known] += (
+                self.blunt[self.known] * self.projections[:, i, j].T
+            )
+        if weights is not None:
+            products *= weights
+        return products
 
 
 def unknown(projections: np.ndarray) -> np.ndarray:
@@ -262,6 +463,7 @@ def squared_errors(observation: Observation, P: np.ndarray) -> np.ndarray:
     ndarray of shape (N,)
         `‖Q (u - p)‖²`, in squared units of the action.
     """
+    assert observation.targets is not None
     return np.sum((observation.targets - np.einsum("nkd,nd->nk", observation.rows, P)) ** 2, axis=1)
 
 

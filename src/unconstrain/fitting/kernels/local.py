@@ -11,9 +11,7 @@ from unconstrain.fitting.kernels.blocks import Totals, rows_in_block, sum_over_b
 from unconstrain.fitting.kernels.products import (
     distinct_products,
     n_pairs,
-    observed_products,
     pair_index,
-    pull,
     unfold,
 )
 from unconstrain.fitting.moments import Moments
@@ -80,7 +78,6 @@ def _of_products(
 
     def add(block: slice, totals: Totals) -> None:
         B, part = features.basis(X[block]), observation[block]
-        rows = part.rows
         receptive, near = _receptive(X[block], centers, width, weights, block)
         (total,) = totals
         summed = working_space("summed", n_summed, size)[:, : len(B)]
@@ -88,9 +85,9 @@ def _of_products(
         if observation.whole:
             products[:, 0] = distinct_products(B)
         else:
-            np.multiply(distinct_products(B)[:, None], observed_products(rows), out=products)
+            np.multiply(distinct_products(B)[:, None], part.products(), out=products)
         pulls = summed[n_products:-2].reshape(d, k, -1)
-        np.multiply(pull(rows, part.targets).T[:, None], B.T, out=pulls)
+        np.multiply(part.pulls.T[:, None], B.T, out=pulls)
         summed[-2] = part.squares
         summed[-1] = 1.0
         if near.all():
@@ -120,15 +117,19 @@ def _of_rows(
 
     def add(block: slice, totals: Totals) -> None:
         part, states = observation[block], X[block].astype(np.float64, copy=False)
-        rows, targets = np.ascontiguousarray(part.rows), part.targets
+        rows, targets, each = np.ascontiguousarray(part.rows), part.targets, part.row_weights
         receptive, near = _receptive(states, centers, width, weights, block)
         H, g, squares, weight = totals
         for k in range(part.n_rows):
             V = features.along(states, rows[:, k])
+            counted = V if each is None else V * each[:, k, None]
             for m in np.flatnonzero(near):
                 weighted = V * receptive[:, m, None]
-                H[m] += weighted.T @ V
-                g[m, :, 0] += weighted.T @ targets[:, k]
+                H[m] += weighted.T @ counted
+                if targets is not None:
+                    g[m, :, 0] += weighted.T @ targets[:, k]
+        if targets is None:
+            g[:, :, 0] += receptive.T @ features.along(states, part.pulls)
         squares += receptive.T @ part.squares
         weight += receptive.sum(axis=0)
 

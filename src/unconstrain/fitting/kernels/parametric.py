@@ -15,7 +15,7 @@ from unconstrain.fitting.kernels.blocks import (
     sum_over_blocks,
     working_space,
 )
-from unconstrain.fitting.kernels.products import distinct_products, n_pairs, observed_products, pull, unfold
+from unconstrain.fitting.kernels.products import distinct_products, n_pairs, unfold
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 
@@ -88,11 +88,10 @@ def of_products(
     def add(block: slice, totals: Totals) -> None:
         B, part = features.basis(X[block]), observation[block]
         omega = None if weights is None else weights[block]
-        rows, targets = part.rows, part.targets
         space = working_space("products", n_pairs(M) + n_pairs(d), size)[:, : len(B)]
         of_basis = distinct_products(B, out=space[: n_pairs(M)])
-        totals[0] += _narrow(of_basis, observed_products(rows, omega, space[n_pairs(M) :]))
-        pulled = pull(rows, targets).T
+        totals[0] += _narrow(of_basis, part.products(omega, space[n_pairs(M) :]))
+        pulled = part.pulls.T
         totals[1] += (pulled if omega is None else pulled * omega) @ B
 
     products, g = sum_over_blocks(len(X), size, [(n_pairs(M), n_pairs(d)), (d, M)], add)
@@ -125,7 +124,7 @@ def of_whole_actions(
     M, d = features.basis(X[:1]).shape[1], observation.n_actions
 
     def add(block: slice, totals: Totals) -> None:
-        B, targets = features.basis(X[block]), observation.targets[block]
+        B, targets = features.basis(X[block]), observation[block].pulls
         if weights is not None:
             root = np.sqrt(weights[block, None])
             B, targets = B * root, targets * root
@@ -162,15 +161,24 @@ def of_rows(
     def add(block: slice, totals: Totals) -> None:
         part = observation[block]
         # A row a sample, as V is made.
-        rows, targets = np.ascontiguousarray(part.rows), part.targets
-        if weights is not None:
-            root = np.sqrt(weights[block, None])
+        rows, targets, each = np.ascontiguousarray(part.rows), part.targets, part.row_weights
+        omega = None if weights is None else weights[block]
+        if targets is not None and omega is not None:
+            root = np.sqrt(omega[:, None])
             rows, targets = rows * root[:, None], targets * root
         states = X[block].astype(np.float64, copy=False)
         for k in range(part.n_rows):
             V = features.along(states, rows[:, k])
-            totals[0] += V.T @ V
-            totals[1] += V.T @ targets[:, k, None]
+            if targets is not None:
+                totals[0] += V.T @ V
+                totals[1] += V.T @ targets[:, k, None]
+            else:
+                assert each is not None
+                counts = each[:, k] if omega is None else each[:, k] * omega
+                totals[0] += (V * counts[:, None]).T @ V
+        if targets is None:
+            pulls = part.pulls if omega is None else part.pulls * omega[:, None]
+            totals[1] += features.along(states, pulls).sum(axis=0)[:, None]
 
     H, g = sum_over_blocks(len(X), rows_in_block(ROWS_IN_BLOCK, P), [(P, P), (P, 1)], add)
     return Moments(H, g, *_squares_and_weight(observation, weights), len(X))

@@ -98,52 +98,6 @@ def distinct_products(
     return products
 
 
-def observed_products(
-    rows: np.ndarray, weights: np.ndarray | None = None, out: np.ndarray | None = None
-) -> np.ndarray:
-    """Compute the distinct entries of `ω QᵀQ`.
-
-    Parameters
-    ----------
-    rows : ndarray of shape (N, k, d)
-        Q.
-    weights : ndarray of shape (N,), optional
-        Weights ω, 1 by default.
-    out : ndarray of shape (d(d+1)/2, N), optional
-        Where they may be written.
-
-    Returns
-    -------
-    ndarray of shape (d(d+1)/2, N)
-        In the order of `pairs`.
-    """
-    if rows.shape[1] == 1:
-        return distinct_products(rows[:, 0], weights, out)
-    i, j = pairs(rows.shape[2])
-    products = np.einsum("nki,nkj->nij", rows, rows)[:, i, j].T
-    return products if weights is None else products * weights
-
-
-def pull(rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Compute `QᵀQ u`.
-
-    Parameters
-    ----------
-    rows : ndarray of shape (N, k, d)
-        Q.
-    targets : ndarray of shape (N, k)
-        `Q u`.
-
-    Returns
-    -------
-    ndarray of shape (N, d)
-        One for each sample.
-    """
-    if rows.shape[1] == 1:
-        return rows[:, 0] * targets
-    return np.einsum("nki,nk->ni", rows, targets)
-
-
 def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
     """Assemble the matrix H from its distinct entries.
 

@@ -30,7 +30,8 @@ def moments(
     """
     omega = np.ones(len(X)) if weights is None else weights
     V = np.stack([features.along(X, observation.rows[:, k]) for k in range(observation.n_rows)], axis=1)
-    H = np.einsum("n,nkp,nkq->pq", omega, V, V)
-    g = np.einsum("n,nkp,nk->p", omega, V, observation.targets)[:, None]
-    s = np.einsum("n,nk,nk->", omega, observation.targets, observation.targets)
+    each = np.ones(V.shape[:2]) if observation.row_weights is None else observation.row_weights
+    H = np.einsum("n,nk,nkp,nkq->pq", omega, each, V, V)
+    g = np.einsum("n,np->p", omega, features.along(X, observation.pulls))[:, None]
+    s = np.einsum("n,n->", omega, observation.squares)
     return Moments(H, g, np.asarray(s), np.asarray(omega.sum()), len(X))

@@ -1,0 +1,177 @@
+"""Which samples were free, along an episode: a hidden state of two values that rarely changes.
+
+Nobody touches and leaves a table at every sample, so what a sample's neighbours say counts. The states form a Markov
+chain along each episode, and forward-backward gives the probability of each, given all samples of its episode.
+
+References
+----------
+Rabiner, A tutorial on hidden Markov models, Proceedings of the IEEE 77, 1989.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+FREE, CONSTRAINED = 0, 1
+
+# As if so many changes and stays had been seen before: a state lasts some 30 samples until the data say otherwise.
+CHANGES_BEFORE, STAYS_BEFORE = 1.0, 29.0
+# As if so many samples of either kind had been seen before.
+SAMPLES_BEFORE = 1.0
+MOST_TELLING = 600.0
+"""Log-likelihoods further apart than this are as good as certain, and their exponential is still a number."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Probabilities of the hidden states.
+
+    Parameters
+    ----------
+    free_share : float
+        Probability that the first sample of an episode is free.
+    leave_free, leave_constrained : float
+        Probability that a sample is of the other kind than the one before it, which was free or constrained.
+    """
+
+    free_share: float = 0.5
+    leave_free: float = 1 / 30
+    leave_constrained: float = 1 / 30
+
+    @property
+    def transitions(self) -> Floats:
+        """Probabilities from the state of a row to that of a column, (2, 2), the free state first."""
+        a, b = self.leave_free, self.leave_constrained
+        return np.array([[1 - a, a], [b, 1 - b]])
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Expected numbers of states and changes; counts add.
+
+    Parameters
+    ----------
+    states : ndarray of shape (2,)
+        Free and constrained samples.
+    changes : ndarray of shape (2, 2)
+        From the state of a row to that of a column.
+    """
+
+    states: Floats
+    changes: Floats
+
+    def __add__(self, other: "Counts") -> "Counts":
+        return Counts(self.states + other.states, self.changes + other.changes)
+
+    def chain(self) -> Chain:
+        """Estimate the probabilities that these counts are most likely under, and a little of what was assumed.
+
+        Returns
+        -------
+        Chain
+            With no probability of zero or one.
+        """
+        free = (self.states[FREE] + SAMPLES_BEFORE) / (self.states.sum() + 2 * SAMPLES_BEFORE)
+        left = np.diag(self.changes[:, ::-1])
+        share = (left + CHANGES_BEFORE) / (self.changes.sum(axis=1) + CHANGES_BEFORE + STAYS_BEFORE)
+        return Chain(float(free), float(share[FREE]), float(share[CONSTRAINED]))
+
+
+def smooth(
+    log_free: Floats,
+    log_constrained: Floats,
+    starts: NDArray[np.bool_],
+    chain: Chain,
+    log_kept: Floats | None = None,
+) -> tuple[Floats, Floats, Counts, Floats]:
+    """Compute how surely each sample was free, given all samples of its episode.
+
+    Parameters
+    ----------
+    log_free, log_constrained : ndarray of shape (N,)
+        Log-likelihood of each sample under either state.
+    starts : ndarray of shape (N,), bool
+        Whether an episode begins with the sample.
+    chain : Chain
+        Probabilities of the states.
+    log_kept : ndarray of shape (N,), optional
+        How much likelier a sample is where it and the one before it are both constrained, as a logarithm.
+
+    Returns
+    -------
+    free : ndarray of shape (N,)
+        Probabilities.
+    log_likelihood : ndarray of shape (N,)
+        Of each sample, given those before it in its episode.
+    counts : Counts
+        Expected numbers.
+    kept : ndarray of shape (N,)
+        Probability that a sample and the one before it are both constrained.
+    """
+    T = chain.transitions
+    first = np.array([chain.free_share, 1 - chain.free_share])
+    top = np.maximum(log_free, log_constrained)
+    likelihood = np.exp(np.maximum(np.stack([log_free, log_constrained], axis=1) - top[:, None], -MOST_TELLING))
+    moves = np.broadcast_to(T, (len(top), 2, 2)).copy()
+    if log_kept is not None:
+        moves[:, CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))
+    steps = moves * likelihood[:, None, :]
+    # The first sample of an episode forgets what was before.
+    steps[starts] = (first * likelihood[starts])[:, None, :]
+    alone = starts.all()
+    if alone:
+        joint = first * likelihood
+        norm = joint.sum(axis=1)
+        free = joint[:, FREE] / norm
+        states = np.array([free.sum(), len(free) - free.sum()])
+        return free, top + np.log(norm), Counts(states, np.zeros((2, 2))), np.zeros_like(free)
+    ahead = _sweep(steps)
+    behind = np.empty_like(ahead)
+    behind[-1] = 0.5
+    behind[:-1] = _sweep(steps[:0:-1].swapaxes(1, 2))[::-1]
+    before = np.empty_like(ahead)
+    before[1:] = np.einsum("ni,nij->nj", ahead[:-1], moves[1:])
+    before[starts] = first
+    log_likelihood = top + np.log(np.einsum("nk,nk->n", before, likelihood))
+    both = ahead * behind
+    both /= both.sum(axis=1, keepdims=True)
+    inner = np.flatnonzero(~starts)
+    pairs = ahead[inner - 1][:, :, None] * moves[inner] * (likelihood * behind)[inner][:, None, :]
+    pairs /= pairs.sum(axis=(1, 2), keepdims=True)
+    kept = np.zeros_like(top)
+    kept[inner] = pairs[:, CONSTRAINED, CONSTRAINED]
+    return both[:, FREE], log_likelihood, Counts(both.sum(axis=0), pairs.sum(axis=0)), kept
+
+
+def _sweep(steps: Floats) -> Floats:
+    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for M (N, 2, 2).
+
+    The steps are cut into pieces of about √N, and all pieces advance side by side: first each one's product, then the
+    row that each begins with, then the rows within.
+    """
+    N = len(steps)
+    length = max(1, int(np.sqrt(N)))
+    n_pieces = -(-N // length)
+    padded = np.empty((n_pieces * length, 2, 2))
+    padded[:N], padded[N:] = steps, np.eye(2)
+    pieces = padded.reshape(n_pieces, length, 2, 2)
+    product = pieces[:, 0].copy()
+    for t in range(1, length):
+        product = product @ pieces[:, t]
+        product /= product.max(axis=(1, 2), keepdims=True)
+    row = np.array([0.5, 0.5])
+    begins = np.empty((n_pieces, 2))
+    for i in range(n_pieces):
+        begins[i] = row
+        row = row @ product[i]
+        row /= row.sum()
+    rows = np.empty((n_pieces, length, 2))
+    current = begins
+    for t in range(length):
+        current = np.einsum("ij,ijk->ik", current, pieces[:, t])
+        current /= current.sum(axis=1, keepdims=True)
+        rows[:, t] = current
+    return rows.reshape(-1, 2)[:N]

@@ -1,0 +1,233 @@
+"""How likely an action is where something was in the way: the sphere of Thales, blurred by noise.
+
+For any orthogonal projection N the action `v = N π` obeys `vᵀ(π - v) = 0`: it lies on the sphere with diameter π, of
+centre π/2 and radius `R = ‖π‖/2`. With v uniform on that sphere and `u = v + ε`, `ε ~ N(0, s² I)`,
+
+    p(u) = (2πs²)^(-d/2) exp(-(ρ² + R²) / 2s²) Γ(d/2) (2/κ)^ν I_ν(κ),    ρ = ‖u - π/2‖,  κ = ρR / s²,  ν = d/2 - 1,
+
+which for s << R is `N(δ; 0, s²) / area(R)` with the distance to the sphere `δ = ρ - R = uᵀ(u - π) / (ρ + R)`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+SERIES_TERMS = 1000
+"""More than the power series takes wherever the Bessel function itself underflows."""
+
+FAR = 1e3
+"""From κ = FAR max(ν, 1)² on five terms of the expansion for large κ are exact in double precision."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Where actions lie beside the spheres of predictions.
+
+    Parameters
+    ----------
+    from_center : ndarray of shape (N,)
+        ρ.
+    radius : ndarray of shape (N,)
+        R.
+    distance : ndarray of shape (N,)
+        δ, negative inside.
+    share : ndarray of shape (N,)
+        `ω = (‖u‖ / (ρ + R))²`, at most 1: `‖u‖² / ‖π‖²` for an action on the sphere.
+    out : ndarray of shape (N, d)
+        Unit vectors from the centre to the action.
+    ahead : ndarray of shape (N, d)
+        Unit vectors of the predictions.
+    """
+
+    from_center: Floats
+    radius: Floats
+    distance: Floats
+    share: Floats
+    out: Floats
+    ahead: Floats
+
+    @classmethod
+    def of(cls, U: Floats, P: Floats) -> "Sphere":
+        """Place actions beside the spheres of predictions.
+
+        Parameters
+        ----------
+        U : ndarray of shape (N, d)
+            Actions.
+        P : ndarray of shape (N, d)
+            Predictions.
+
+        Returns
+        -------
+        Sphere
+            Of N samples.
+        """
+        aside = U - P / 2
+        from_center = np.sqrt(np.einsum("nd,nd->n", aside, aside))
+        length = np.sqrt(np.einsum("nd,nd->n", P, P))
+        across = from_center + length / 2
+        squares = np.einsum("nd,nd->n", U, U)
+        safe = np.where(across > 0, across, 1.0)
+        return cls(
+            from_center,
+            length / 2,
+            (squares - np.einsum("nd,nd->n", U, P)) / safe,
+            squares / safe**2,
+            _unit(aside, from_center),
+            _unit(P, length),
+        )
+
+    @property
+    def normal(self) -> Floats:
+        """The gradient of the distance δ by the prediction, `-(out + ahead) / 2`, (N, d)."""
+        return -(self.out + self.ahead) / 2
+
+
+@dataclass(frozen=True)
+class Density:
+    """The logarithm of a density, and how it changes.
+
+    Parameters
+    ----------
+    log : ndarray of shape (N,)
+        `log p(u)`.
+    by_policy : ndarray of shape (N, d)
+        Its gradient by the prediction, at a given variance.
+    by_variance : ndarray of shape (N,)
+        Its derivative by s².
+    """
+
+    log: Floats
+    by_policy: Floats
+    by_variance: Floats
+
+
+def blurred(sphere: Sphere, variance: Floats) -> Density:
+    """Compute the exact marginal.
+
+    Parameters
+    ----------
+    sphere : Sphere
+        Of N samples.
+    variance : ndarray of shape (N,)
+        s² of each.
+
+    Returns
+    -------
+    Density
+        Of the recorded actions.
+    """
+    d = sphere.out.shape[1]
+    rho, R = sphere.from_center, sphere.radius
+    kappa = rho * R / variance
+    log_bessel, ratio = scaled_bessel(d, kappa)
+    log = -0.5 * d * np.log(2 * np.pi * variance) - sphere.distance**2 / (2 * variance) + log_bessel
+    # 1 - ratio falls as 1/κ, so these differences keep their digits.
+    pulls_out, pulls_in = sphere.distance + R * (1 - ratio), -sphere.distance + rho * (1 - ratio)
+    by_policy = (pulls_out[:, None] * sphere.out - pulls_in[:, None] * sphere.ahead) / (
+        2 * variance[:, None]
+    )
+    squares = sphere.distance**2 + 2 * rho * R * (1 - ratio)
+    return Density(log, by_policy, (squares / variance - d) / (2 * variance))
+
+
+def limit(sphere: Sphere, variance: Floats) -> Floats:
+    """Compute what the exact marginal becomes for s << R, `log N(δ; 0, s²) - log area(R)`.
+
+    Parameters
+    ----------
+    sphere : Sphere
+        Of N samples.
+    variance : ndarray of shape (N,)
+        s² of each.
+
+    Returns
+    -------
+    ndarray of shape (N,)
+        `log p(u)`.
+    """
+    from scipy.special import gammaln
+
+    d = sphere.out.shape[1]
+    area = np.log(2) + d / 2 * np.log(np.pi) - gammaln(d / 2) + (d - 1) * np.log(sphere.radius)
+    return -(sphere.distance**2) / (2 * variance) - 0.5 * np.log(2 * np.pi * variance) - area
+
+
+def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
+    """Compute the mean of `exp(κ m₁ - κ)` over the unit sphere, and by how much it changes.
+
+    Parameters
+    ----------
+    d : int
+        Dimension of the space that the sphere lies in.
+    kappa : ndarray of shape (N,)
+        κ >= 0.
+
+    Returns
+    -------
+    log_mean : ndarray of shape (N,)
+        `log(Γ(d/2) (2/κ)^ν I_ν(κ)) - κ`, 0 at κ = 0.
+    ratio : ndarray of shape (N,)
+        `I_{ν+1}(κ) / I_ν(κ)`, the mean of m₁ where its density is proportional to `exp(κ m₁)`; 0 to 1.
+    """
+    from scipy.special import gammaln, ive
+
+    nu = d / 2 - 1
+    if d == 1:  # a sphere of two points
+        decayed = np.exp(-2 * kappa)
+        return np.log1p(decayed) - np.log(2.0), (1 - decayed) / (1 + decayed)
+    log_mean, ratio = np.empty_like(kappa), np.empty_like(kappa)
+    least = 1e-4 * np.sqrt(d)
+    with np.errstate(under="ignore", divide="ignore", invalid="ignore"):
+        huge = kappa > FAR * max(nu, 1.0) ** 2
+        bessel = ive(nu, np.where(huge, 1.0, kappa))
+        fine = (bessel > 1e-290) & (kappa > least) & ~huge
+        log_mean[fine] = (
+            gammaln(d / 2) + nu * np.log(2 / kappa[fine]) + np.log(bessel[fine])
+        )
+        ratio[fine] = ive(nu + 1, kappa[fine]) / bessel[fine]
+    if not fine.all():
+        rest = ~fine & ~huge
+        value, slope = _series(nu, kappa[rest])
+        log_mean[rest], ratio[rest] = value - kappa[rest], slope
+    if huge.any():
+        k = kappa[huge]
+        first, second = _hankel(nu, k), _hankel(nu + 1, k)
+        log_mean[huge] = gammaln(d / 2) + nu * np.log(2 / k) - 0.5 * np.log(2 * np.pi * k) + np.log(first)
+        ratio[huge] = second / first
+    return log_mean, ratio
+
+
+def _series(nu: float, kappa: Floats) -> tuple[Floats, Floats]:
+    """Sum `log 0F1(; ν+1; κ²/4)`, and κ / 2(ν+1) times the quotient of two of them, by powers."""
+    quarter = kappa**2 / 4
+
+    def log_sum(order: float) -> Floats:
+        log_term, log_total = np.zeros_like(quarter), np.zeros_like(quarter)
+        with np.errstate(divide="ignore"):
+            log_quarter = np.log(quarter)
+        for k in range(1, SERIES_TERMS):
+            log_term = log_term + log_quarter - np.log(k * (order + k))
+            log_total = np.logaddexp(log_total, log_term)
+            if np.all(log_term < log_total - 40):
+                break
+        return log_total
+
+    total = log_sum(nu)
+    return total, kappa / (2 * (nu + 1)) * np.exp(log_sum(nu + 1) - total)
+
+
+def _hankel(nu: float, kappa: Floats) -> Floats:
+    """Expand `sqrt(2πκ) exp(-κ) I_ν(κ)` in powers of 1/κ."""
+    total, term = np.ones_like(kappa), np.ones_like(kappa)
+    for k in range(1, 6):
+        term = term * -(4 * nu**2 - (2 * k - 1) ** 2) / (8 * k * kappa)
+        total += term
+    return total
+
+
+def _unit(V: Floats, length: Floats) -> Floats:
+    return V * np.divide(1.0, length, out=np.zeros_like(length), where=length > 0)[:, None]

@@ -124,7 +124,8 @@ class Identifiability:
     @cached_property
     def posterior(self) -> Posterior:
         """The distribution of the parameters, given these recordings."""
-        return Posterior.of(self.information.moments)
+        moments = self.information.moments
+        return Posterior.of(moments, decay=self.policy.model_.decay(moments))
 
     def covariance(self, X: ArrayLike) -> np.ndarray:
         """Compute how far the policy may be from `predict(X)`.

@@ -41,7 +41,7 @@ class Solution:
     w : ndarray of shape (P,) or (S, P)
         Parameters of the model, or of each of S models.
     alpha : float
-        The weight decay λ.
+        The weight decay λ, a pure number; see `fitting.decay`.
     alphas, held_out_risk : ndarray of shape (L,), optional
         The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
     n_samples, n_zero, n_known : int
@@ -284,11 +284,11 @@ class Accumulator:
         alpha = self.alpha if alpha is None else alpha
         folds = self._folds(without)
         total = Moments.sum(folds)
+        decay = self.model.decay(total)
         if alpha != "cv":
-            return self._solution(total.solve(float(alpha)), float(alpha))
-        spectrum = total.decompose()
-        chosen, alphas, risk = choose_alpha(folds, float(spectrum.values.max()))
-        return self._solution(spectrum.solve([chosen])[..., 0, :], chosen, alphas, risk)
+            return self._solution(decay.solve(total, float(alpha)), float(alpha))
+        chosen, alphas, risk = choose_alpha(folds, self.model.decay)
+        return self._solution(decay.solve(total, chosen), chosen, alphas, risk)
 
     def _solution(
         self,

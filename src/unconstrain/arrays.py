@@ -392,6 +392,38 @@ def check_number(value: object, name: str, *, positive: bool) -> float:
     return number
 
 
+def check_widths(value: object, name: str, n: int) -> np.ndarray:
+    """Check a width: one positive number for all dimensions, or one for each.
+
+    Parameters
+    ----------
+    value : object
+        To check.
+    name : str
+        Of the argument.
+    n : int
+        Number of dimensions.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        The widths.
+
+    Raises
+    ------
+    PolicyError
+        If it is neither.
+    """
+    if np.ndim(value) == 0:  # type: ignore[arg-type]
+        return np.full(n, check_number(value, name, positive=True))
+    widths = check_numbers(value, name)  # type: ignore[arg-type]
+    if widths.shape != (n,) or not np.all(np.isfinite(widths) & (widths > 0)):
+        raise PolicyError(
+            f"{name} must be a positive number, or one for each of the {n} states, got {quote(value)}"
+        )
+    return widths
+
+
 def check_whole(value: object, name: str, *, least: int, most: int | None = None) -> int:
     """Check an option that is a whole number.
 

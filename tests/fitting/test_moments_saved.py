@@ -58,7 +58,10 @@ def test_moments_of_local_models_are_copied_pickled_and_saved_alike(tmp_path):
 def test_moments_of_two_days_add_to_those_of_both(tmp_path):
     yesterday = fitted(1e-6)
     moments.save(yesterday.moments_, tmp_path / "yesterday.npz")
-    today, both = yesterday.resume().empty(), yesterday.resume().empty()  # under the same model: features and all
+    today, both = (
+        yesterday.resume().empty(),
+        yesterday.resume().empty(),
+    )  # under the same model: features and all
     today.add(Samples(X[200:], U[200:]))
     both.add(Samples(X, U))
     total, both = moments.load(tmp_path / "yesterday.npz")[0] + today.moments(), both.moments()

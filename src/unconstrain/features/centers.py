@@ -11,7 +11,7 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import check_choice, check_finite, check_number, check_numbers, check_whole, quote
+from unconstrain.arrays import check_choice, check_finite, check_numbers, check_whole, check_widths, quote
 from unconstrain.errors import PolicyError
 from unconstrain.features.scaling import Scaling
 from unconstrain.memory import check_memory
@@ -77,10 +77,9 @@ def place_centers(
     scaling = Scaling.of(X, sample_weight)
     if width is None:
         unit, sigma = scaling.spread, None
-    elif np.ndim(width) == 0:
-        unit, sigma = np.ones(n), check_number(width, "width", positive=True)
-    else:
-        unit, sigma = _check_widths(width, n), 1.0
+    else:  # one number leaves distances as they stand, and n numbers are units as well
+        widths = check_widths(width, "width", n)
+        unit, sigma = (np.ones(n), float(widths[0])) if np.ndim(width) == 0 else (widths, 1.0)
     if not isinstance(centers, str):
         placed = np.atleast_2d(check_numbers(centers, "centers")).copy()
         if placed.ndim != 2 or placed.shape[1] != n or not len(placed):
@@ -100,15 +99,6 @@ def place_centers(
     if sigma is None:
         sigma = _spacing_width(Scaling(scaling.mean, unit), placed, X)
     return placed, unit * sigma
-
-
-def _check_widths(width: ArrayLike, n: int) -> np.ndarray:
-    widths = check_numbers(width, "width")
-    if widths.shape != (n,) or not np.all(np.isfinite(widths) & (widths > 0)):
-        raise PolicyError(
-            f"width must be a positive number, or one for each of the {n} states, got {quote(width)}"
-        )
-    return widths
 
 
 def grid(X: np.ndarray, n_centers: int) -> np.ndarray:

@@ -83,11 +83,6 @@ class Policy(RegressorMixin, BaseEstimator):
             An option is impossible.
         """
 
-    @property
-    @abstractmethod
-    def placed_by_data(self) -> bool:
-        """Whether `place` depends on where the states lie, and not just on their dimension."""
-
     def fit(
         self,
         X: ArrayLike | Demonstrations,

@@ -126,11 +126,6 @@ class LocallyLinearPolicy(Policy):
         check_choice(self.prior, "prior", PRIORS)
 
     @property
-    def placed_by_data(self) -> bool:
-        """Whether centres, width or features depend on where the states lie."""
-        return self.features is not None or isinstance(self.centers, str) or self.width is None
-
-    @property
     def features_(self) -> Features:
         """The fitted feature map of each model."""
         return self.model_.features

@@ -90,11 +90,6 @@ class ParametricPolicy(Policy):
         return GlobalModel(features, X.shape[1], d)
 
     @property
-    def placed_by_data(self) -> bool:
-        """Whether features may depend on where the states lie: all but those of the linear policy."""
-        return self.features is not None
-
-    @property
     def weights_(self) -> np.ndarray:
         """The parameters w, (P,)."""
         return self.solution_.w

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
@@ -146,13 +147,16 @@ class Accumulator:
         Raises
         ------
         DataError
-            An action is so long that hardly any other is motion beside it.
+            An action is so long that hardly any other is motion beside it, or a known projection does not let its
+            sample's own action through.
         """
         U = samples.actions
         r = lengths(U)
         longest = max(float(r.max(initial=0.0)), self.longest)
         moves = r > NO_MOTION * longest
         _check_outlier(r, moves)
+        if samples.projections is not None:
+            check_lets_through(samples.projections, U)
         counted = find_informative_samples(self.risk, samples, moves)
         observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))

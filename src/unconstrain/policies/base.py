@@ -116,7 +116,8 @@ class Policy(RegressorMixin, BaseEstimator):
         Raises
         ------
         DataError
-            Arrays are not finite or do not fit together, or nothing moves though the risk needs directions.
+            Arrays are not finite or do not fit together, nothing moves though the risk needs directions, or a known
+            projection does not let its sample's own action through.
         PolicyError
             An option is impossible.
         """

@@ -239,7 +239,7 @@ def select_policy(
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
     >>> U = np.einsum("nij,nj->ni", N, -np.tanh(X))
     >>> uc.select_policy("auto", X, U).name
-    'decoupled'
+    'decoupled, coarse'
     """
     import joblib
 

@@ -34,7 +34,7 @@ def test_a_policy_that_loses_to_ordinary_regression_says_so(run, tmp_path):
     write_csv(uc.Demonstrations(X, U, np.repeat(np.arange(10), 20)), tmp_path / "free.csv")
     for risk, rival in (("inconsistency", "direct"), ("direct", "inconsistency")):
         code, out, err = run(
-            "fit", "free.csv", *COLUMNS, "--model", "locally-linear", "--risk", risk, "--out", f"{risk}.skops"
+            "fit", "free.csv", *COLUMNS, "--model", "rbf", "--risk", risk, "--out", f"{risk}.skops"
         )
         assert code == 0, err
         assert (f"`--risk {rival}` saves it instead" in out) == (risk == "inconsistency"), out

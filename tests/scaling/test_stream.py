@@ -252,7 +252,7 @@ def test_what_counts_as_motion_does_not_depend_on_the_batches():
     for source in (batches, lambda: iter(batches)):
         assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha=1e-3), source, batch_rows=50), whole)
     with pytest.raises(uc.errors.DataError, match="was taken for motion before one of length"):
-        stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), iter(batches), batch_rows=50)
+        stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), iter(batches), batch_rows=50, sample_rows=100)
 
 
 def test_progress_tells_rows_done_and_in_all(tmp_path, capsys):

@@ -12,7 +12,7 @@ A feature map has three methods, and may have more. Each further method is a cap
 | `along(X, directions)`          | yes    | everything that adds up samples or measures uncertainty                   |
 | `evaluate(X, w)`                | yes    | `predict`                                                                 |
 | `basis(X)`                      | no     | the fast kernels: it says that `π(x) = W b(x)` with W free      |
-| `decay_basis(second)`           | no     | the weight decay, how a basis is standardised, and its intercepts          |
+| `decay_basis(second)`           | no     | the weight decay: how a basis is standardised, its intercepts            |
 | `linear(w)`                     | no     | `coef_` and `intercept_`, and compiling local models                      |
 | `compile(w)`                    | no     | `policy.compile()`, for the control loop                                  |
 

@@ -77,6 +77,7 @@ class FullFeatures(BaseEstimator):
         self
             Fitted.
         """
+        self.scaling_: Scaling | None
         if self.transformer is None:
             self.scaling_ = Scaling.of(X, sample_weight)
             self.transformer_ = None
@@ -103,9 +104,9 @@ class FullFeatures(BaseEstimator):
         if self.transformer_ is None:
             # Stored a row a feature, as products are formed.
             rows = np.empty((X.shape[1] + 1, len(X)))
-            scaling = self.scaling_
-            np.subtract(X.T, scaling.mean[:, None], out=rows[:-1])
-            rows[:-1] /= scaling.spread[:, None]
+            mean, spread = self._standard
+            np.subtract(X.T, mean[:, None], out=rows[:-1])
+            rows[:-1] /= spread[:, None]
             rows[-1] = 1.0
             return rows.T
         Z = X.astype(np.float64, copy=False) if self.scaling_ is None else self.scaling_(X)
@@ -190,8 +191,9 @@ class FullFeatures(BaseEstimator):
         if self.transformer_ is not None:
             return None
         W = w.reshape(*w.shape[:-1], self.n_actions_, -1)
-        coef = W[..., :-1] / self.scaling_.spread
-        return coef, W[..., -1] - coef @ self.scaling_.mean
+        mean, spread = self._standard
+        coef = W[..., :-1] / spread
+        return coef, W[..., -1] - coef @ mean
 
     def compile(self, w: np.ndarray) -> CompiledPolicy:
         """Compile the policy for a control loop.
@@ -218,6 +220,12 @@ class FullFeatures(BaseEstimator):
         if not isinstance(basis, Compilable):
             raise compilation_error(self.transformer_)
         return basis.compile(w.reshape(self.n_actions_, -1))
+
+    @property
+    def _standard(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and spread of the states that linear features count from and in."""
+        assert self.scaling_ is not None
+        return self.scaling_.mean, self.scaling_.spread
 
 
 def as_features(given: Any) -> Features:

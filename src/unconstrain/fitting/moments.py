@@ -82,14 +82,14 @@ class Moments:
         )
 
     def __add__(self, other: "Moments") -> "Moments":
-        both = self.everywhere is not None and other.everywhere is not None
+        here, there = self.everywhere, other.everywhere
         return Moments(
             self.H + other.H,
             self.g + other.g,
             self.squares + other.squares,
             self.weight + other.weight,
             self.n_samples + other.n_samples,
-            self.everywhere + other.everywhere if both else None,
+            None if here is None or there is None else here + there,
         )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -241,7 +241,7 @@ class Spectrum:
         alphas : array_like of shape (L,)
             One λ for each.
         toward : ndarray of shape (P, L, K), optional
-            t, for each λ; by default zero.
+            Parameters t for each λ; by default zero.
 
         Returns
         -------

@@ -64,8 +64,11 @@ def moments(
     Moments
         Stacked along a leading axis of M models; with those of the one more as `everywhere`.
     """
-    of = _of_products if isinstance(features, FullBasis) else _of_rows
-    found = of(features, _Fields(centers, width, everywhere), X, observation, weights)
+    fields = _Fields(centers, width, everywhere)
+    if isinstance(features, FullBasis):
+        found = _of_products(features, fields, X, observation, weights)
+    else:
+        found = _of_rows(features, fields, X, observation, weights)
     if not everywhere:
         return found
     H, g, squares, weight = (part[:-1] for part in (found.H, found.g, found.squares, found.weight))

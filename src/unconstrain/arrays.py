@@ -23,9 +23,12 @@ SQUARABLE = 1e150
 ROUNDED = 0.05
 """How far `N N v` may be from `N v` in each component: projections rounded to two decimals pass."""
 
-BLOCKED = 0.5
-"""Share of an action, or of a typical one where that is longer, beyond which its own projection may not block it: noise
-and the moment of contact block some."""
+BLOCKED = 0.5**0.5
+"""Share of an action, or of a typical one where that is longer, beyond which its own projection may not block it: it
+then blocks more than it lets through. Noise, friction in the forces, and the moment of contact block some."""
+
+EXPLAINED = 0.2
+"""Share that another projection may block where it is said to be the one meant."""
 
 NOT_IDEMPOTENT = (
     "is none, since applied twice it does something else than applied once: give N = I - A⁺A, as "
@@ -311,8 +314,8 @@ def check_lets_through(projections: np.ndarray, U: np.ndarray) -> None:
     N, u = projections[known], U[known] / largest
     through = np.einsum("nij,nj->ni", N, u)
     r = np.linalg.norm(u, axis=1)
-    limit = BLOCKED * np.maximum(r, np.sqrt(np.mean(r**2)))
-    bad = np.flatnonzero(np.linalg.norm(u - through, axis=1) > limit)
+    size = np.maximum(r, np.sqrt(np.mean(r**2)))
+    bad = np.flatnonzero(np.linalg.norm(u - through, axis=1) > BLOCKED * size)
     if not len(bad):
         return
     first = bad[0]
@@ -320,18 +323,18 @@ def check_lets_through(projections: np.ndarray, U: np.ndarray) -> None:
     raise DataError(
         f"the projection of row {known[first]} does not let through the action that was recorded under it: of "
         f"{largest * r[first]:.3g} it blocks {largest * np.linalg.norm(u[first] - through[first]):.3g}{others}. "
-        f"{_cause_of_blocking(N, u, through, limit, bad)}",
+        f"{_cause_of_blocking(N, u, through, size, bad)}",
         row=int(known[first]),
     )
 
 
 def _cause_of_blocking(
-    N: np.ndarray, u: np.ndarray, through: np.ndarray, limit: np.ndarray, bad: np.ndarray
+    N: np.ndarray, u: np.ndarray, through: np.ndarray, size: np.ndarray, bad: np.ndarray
 ) -> str:
     """Find what would let most of the blocked actions through, and say so."""
 
     def explains(remaining: np.ndarray) -> bool:
-        return bool(np.mean(np.linalg.norm(remaining, axis=1) <= limit[bad]) > 0.8)
+        return bool(np.mean(np.linalg.norm(remaining, axis=1) <= EXPLAINED * size[bad]) > 0.8)
 
     if explains(through[bad]):
         return (

@@ -68,7 +68,7 @@ def test_a_projection_that_blocks_its_own_action_is_refused_with_the_likely_caus
         "frame": N[:, ::-1, ::-1],
     }[cause]
     if cause.startswith("row"):  # directions that change from row to row, as in a wiped bowl
-        angle = np.linspace(0, 40, 80)
+        angle = np.linspace(0, 80, 80)
         U = np.column_stack([np.cos(angle), np.sin(angle)])
         N, X = U[:, :, None] * U[:, None, :], U
         given = np.roll(N, -1 if cause == "row before" else 1, axis=0)

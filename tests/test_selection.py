@@ -39,7 +39,7 @@ def test_on_the_limit_cycle_the_choice_is_among_the_best_though_no_truth_is_seen
 def test_joints_that_go_their_own_way_are_recognised():
     states, actions, Pi, episodes = joints()
     best = uc.select_policy("auto", states, actions, episodes)
-    assert best.name in ("decoupled", "decoupled, fine")
+    assert best.name in ("decoupled", "decoupled, coarse")
     error = uc.metrics.unconstrained_policy_error(Pi, best.policy.predict(states))
     assert uc.metrics.normalized(error, Pi) < 0.01
 
@@ -154,7 +154,7 @@ def test_candidates_are_left_alone_and_named_apart():
 @pytest.mark.parametrize(("n", "d"), [(1, 1), (2, 2), (7, 7), (6, 3), (27, 27)])
 def test_default_candidates_can_be_solved_in_seconds_whatever_the_dimension(n, d):
     named = candidates(n, d)
-    assert ("decoupled" in named) == ("potential" in named) == (n == d)
+    assert ("decoupled, coarse" in named) == ("potential" in named) == (n == d)
     X, U = np.random.default_rng(0).normal(size=(120, n)), np.random.default_rng(1).normal(size=(120, d))
     for name, policy in named.items():
         *models, parameters, _ = policy.set_params(alpha=1.0).fit(X, U).moments_[0].g.shape

@@ -30,16 +30,19 @@ def touched(U, episodes, seed=0):
     which every third is not known, as lists and row by row.
     """
     rng = np.random.default_rng(seed)
-    forces, free = 0.3 * rng.normal(size=U.shape), np.zeros(len(U))
+    forces, free = 0.1 * rng.normal(size=U.shape), np.zeros(len(U))
     N = np.empty((len(U), 3, 3))
     for label in np.unique(episodes):
         own = np.flatnonzero(episodes == label)
-        normal = rng.normal(size=3)
-        normal /= np.linalg.norm(normal)
+        # Across the motion, as a constraint is; where it rests, across the motion before or after.
+        moves = np.flatnonzero(U[own].any(axis=1))
+        nearest = moves[np.abs(np.arange(len(own))[:, None] - moves).argmin(axis=1)]
+        normal = np.cross(U[own][nearest], rng.normal(size=3))
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         contact = own[len(own) // 4 : len(own) // 4 + rng.integers(3, len(own) // 2)]
-        forces[contact] += rng.uniform(1.0, 6.0) * normal
+        forces[contact] += rng.uniform(1.0, 6.0) * normal[contact - own[0]]
         free[own[-4:]] = 1.0
-        N[own] = np.eye(3) - np.outer(normal, normal)
+        N[own] = np.eye(3) - normal[:, :, None] * normal[:, None]
     N[rng.random(len(U)) < 1 / 3] = np.nan
     rows = [None if np.isnan(row).any() else row for row in N.reshape(-1, 9)]
     return {

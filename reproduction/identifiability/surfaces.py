@@ -73,7 +73,7 @@ def examine_surfaces(folder: Path) -> list[Surface]:
     return result
 
 
-def fit_normals(cloud: Array, at: Array, reach: float) -> Array:
+def fit_normals(cloud: Array, at: Array, reach: float | Array) -> Array:
     """Fit planes to the points (N, 3) around each of `at` (Q, 3), by total least squares; their normals (Q, 3)."""
     weights = activations(at, cloud, reach)
     weights /= weights.sum(axis=1, keepdims=True)

@@ -23,6 +23,13 @@ SQUARABLE = 1e150
 ROUNDED = 0.05
 """How far `N N v` may be from `N v` in each component: projections rounded to two decimals pass."""
 
+BLOCKED = 0.5**0.5
+"""Share of an action, or of a typical one where that is longer, beyond which its own projection may not block it: it
+then blocks more than it lets through. Noise, friction in the forces, and the moment of contact block some."""
+
+EXPLAINED = 0.2
+"""Share that another projection may block where it is said to be the one meant."""
+
 NOT_IDEMPOTENT = (
     "is none, since applied twice it does something else than applied once: give N = I - A⁺A, as "
     "constraints.projection(A) makes it of the rows A"
@@ -285,6 +292,68 @@ def not_idempotent(projections: np.ndarray) -> np.ndarray:
     return np.flatnonzero(~same & ~np.isnan(projections).any(axis=(1, 2)))
 
 
+def check_lets_through(projections: np.ndarray, U: np.ndarray) -> None:
+    """Check that known projections let their samples' own actions through, `N u = u` but for noise.
+
+    Parameters
+    ----------
+    projections : ndarray of shape (N, d, d)
+        All NaN where not known.
+    U : ndarray of shape (N, d)
+        Actions.
+
+    Raises
+    ------
+    DataError
+        One blocks much of the action that was recorded under it; the sentence names the row and the likely cause.
+    """
+    known = np.flatnonzero(~np.isnan(projections).any(axis=(1, 2)))
+    largest = float(np.abs(U[known]).max(initial=0.0))
+    if not largest:
+        return
+    N, u = projections[known], U[known] / largest
+    through = np.einsum("nij,nj->ni", N, u)
+    r = np.linalg.norm(u, axis=1)
+    size = np.maximum(r, np.sqrt(np.mean(r**2)))
+    bad = np.flatnonzero(np.linalg.norm(u - through, axis=1) > BLOCKED * size)
+    if not len(bad):
+        return
+    first = bad[0]
+    others = "" if len(bad) == 1 else f" (nor do those of {len(bad) - 1} other rows)"
+    raise DataError(
+        f"the projection of row {known[first]} does not let through the action that was recorded under it: of "
+        f"{largest * r[first]:.3g} it blocks {largest * np.linalg.norm(u[first] - through[first]):.3g}{others}. "
+        f"{_cause_of_blocking(N, u, through, size, bad)}",
+        row=int(known[first]),
+    )
+
+
+def _cause_of_blocking(
+    N: np.ndarray, u: np.ndarray, through: np.ndarray, size: np.ndarray, bad: np.ndarray
+) -> str:
+    """Find what would let most of the blocked actions through, and say so."""
+
+    def explains(remaining: np.ndarray) -> bool:
+        return bool(np.mean(np.linalg.norm(remaining, axis=1) <= EXPLAINED * size[bad]) > 0.8)
+
+    if explains(through[bad]):
+        return (
+            "Likely it is the projection onto what the constraint forbids: give I minus it, the projection onto what "
+            "the constraint leaves free"
+        )
+    for by, word in ((1, "before"), (-1, "after")):
+        beside = np.clip(bad - by, 0, len(u) - 1)
+        if explains(u[bad] - np.einsum("nij,nj->ni", N[beside], u[bad])):
+            return (
+                f"Likely it belongs to another row, since that of the row {word} fits: give projections in the order "
+                "of the actions"
+            )
+    return (
+        "Likely it is in another frame than the actions, or their columns are in another order; where it is not known "
+        "what the constraint was, make it NaN"
+    )
+
+
 def check_weights(sample_weight: ArrayLike | None, X: np.ndarray) -> np.ndarray:
     """Check sample weights.
 
@@ -390,6 +459,38 @@ def check_number(value: object, name: str, *, positive: bool) -> float:
     if not np.isfinite(number) or number < 0 or (positive and number == 0):
         raise PolicyError(f"{name} must be a finite number {wanted}, got {quote(value)}")
     return number
+
+
+def check_widths(value: object, name: str, n: int) -> np.ndarray:
+    """Check a width: one positive number for all dimensions, or one for each.
+
+    Parameters
+    ----------
+    value : object
+        To check.
+    name : str
+        Of the argument.
+    n : int
+        Number of dimensions.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        The widths.
+
+    Raises
+    ------
+    PolicyError
+        If it is neither.
+    """
+    if np.ndim(value) == 0:  # type: ignore[arg-type]
+        return np.full(n, check_number(value, name, positive=True))
+    widths = check_numbers(value, name)  # type: ignore[arg-type]
+    if widths.shape != (n,) or not np.all(np.isfinite(widths) & (widths > 0)):
+        raise PolicyError(
+            f"{name} must be a positive number, or one for each of the {n} states, got {quote(value)}"
+        )
+    return widths
 
 
 def check_whole(value: object, name: str, *, least: int, most: int | None = None) -> int:

@@ -1,6 +1,7 @@
 """Gaussian receptive fields: how much a state activates each of several centres.
 
-`width` is σ of `exp(-‖x - c‖² / 2σ²)` throughout, in the unit of the states.
+`width` is σ of `exp(-‖x - c‖² / 2σ²)` throughout, in the unit of the states: one number, or one for each dimension, by
+which each is then divided before distances are taken.
 """
 
 import numpy as np
@@ -31,7 +32,7 @@ def squared_distances(X: np.ndarray, centers: np.ndarray) -> np.ndarray:
     return cdist(X, centers, "sqeuclidean")
 
 
-def activations(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
+def activations(X: np.ndarray, centers: np.ndarray, width: float | np.ndarray) -> np.ndarray:
     """Compute how much states activate centres.
 
     Parameters
@@ -40,7 +41,7 @@ def activations(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
         States.
     centers : ndarray of shape (M, n)
         Centres.
-    width : float
+    width : float or ndarray of shape (n,)
         σ, in the unit of the states.
 
     Returns
@@ -48,11 +49,12 @@ def activations(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
     ndarray of shape (N, M)
         `exp(-‖x - c‖² / 2σ²)`.
     """
-    exponent = _exponents(squared_distances(X, centers), width)
+    X, centers, sigma = _in_one_unit(X, centers, width)
+    exponent = _exponents(squared_distances(X, centers), sigma)
     return np.exp(exponent, out=exponent)
 
 
-def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:
+def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float | np.ndarray) -> np.ndarray:
     """Compute activations divided by their sum over the centres.
 
     Parameters
@@ -61,7 +63,7 @@ def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float) -> 
         States, however far from all centres.
     centers : ndarray of shape (M, n)
         Centres.
-    width : float
+    width : float or ndarray of shape (n,)
         σ, in the unit of the states.
 
     Returns
@@ -69,18 +71,30 @@ def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float) -> 
     ndarray of shape (N, M)
         Shares of the centres, which sum to one.
     """
+    X, centers, sigma = _in_one_unit(X, centers, width)
     exponent = squared_distances(X, centers)
     nearest = exponent.min(axis=1, keepdims=True)
-    far = nearest[:, 0] > 2 * FAR * width**2 if NARROWEST < width < WIDEST else np.zeros(len(X), dtype=bool)
+    far = nearest[:, 0] > 2 * FAR * sigma**2 if NARROWEST < sigma < WIDEST else np.zeros(len(X), dtype=bool)
     with np.errstate(invalid="ignore"):  # where distances overflow
         # Far from all centres every activation would underflow to zero: the nearest one's exponent is taken out.
         exponent -= nearest
-    exponent = _exponents(exponent, width)
+    exponent = _exponents(exponent, sigma)
     if far.any():
-        exponent[far] = _exponents_from_afar(X[far], centers, width)
+        exponent[far] = _exponents_from_afar(X[far], centers, sigma)
     np.exp(exponent, out=exponent)
     exponent /= exponent.sum(axis=1, keepdims=True)
     return exponent
+
+
+def _in_one_unit(
+    X: np.ndarray, centers: np.ndarray, width: float | np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Divide each dimension by its own width, and return the one width that is left."""
+    widths = np.ravel(width)
+    if np.all(widths == widths[0]):
+        return X, centers, float(widths[0])
+    mean = centers.mean(axis=0)  # a far origin would cost the digits that tell centres apart
+    return (X - mean) / widths, (centers - mean) / widths, 1.0
 
 
 def _exponents_from_afar(X: np.ndarray, centers: np.ndarray, width: float) -> np.ndarray:

@@ -26,6 +26,7 @@ from unconstrain import metrics
 from unconstrain.arrays import (
     check_actions,
     check_groups,
+    check_lets_through,
     check_number,
     check_projections,
     check_samples,
@@ -44,7 +45,7 @@ from unconstrain.policies.parametric import ParametricPolicy
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
 MOST_CENTERS = 50
-FINE_KNOTS = 31
+COARSE_KNOTS = 15
 
 INCONSISTENCY = "held-out inconsistency"
 OF_WHAT_IS_KNOWN = "held-out error of what is known"
@@ -179,9 +180,11 @@ def candidates(n: int, d: int) -> dict[str, Policy]:
     if knots >= 2:
         named["splines"] = ParametricPolicy(SplineTransformer(n_knots=knots, extrapolation="linear"))
     if n == d:
-        named["decoupled"] = ParametricPolicy(DecoupledFeatures())
-        if n * FINE_KNOTS <= MOST_PARAMETERS:  # for policies with a corner, such as ∇|x|^1.5
-            named["decoupled, fine"] = ParametricPolicy(DecoupledFeatures(FINE_KNOTS))
+        # Fine knots for policies with a corner, such as ∇|x|^1.5; coarse ones where data are few or dimensions many.
+        fine = DecoupledFeatures()
+        if n * (fine.n_knots + fine.degree - 1) <= MOST_PARAMETERS:
+            named["decoupled"] = ParametricPolicy(fine)
+        named["decoupled, coarse"] = ParametricPolicy(DecoupledFeatures(COARSE_KNOTS))
         named["potential"] = ParametricPolicy(PotentialFeatures(NormalizedRBF(2 * MOST_CENTERS)))
     return named
 
@@ -236,7 +239,7 @@ def select_policy(
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(200, 1, 2)))
     >>> U = np.einsum("nij,nj->ni", N, -np.tanh(X))
     >>> uc.select_policy("auto", X, U).name
-    'decoupled'
+    'decoupled, coarse'
     """
     import joblib
 
@@ -246,6 +249,7 @@ def select_policy(
     named = _name_candidates(candidates, X.shape[1], actions.shape[1])
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
+        check_lets_through(projections, actions)
     # What no candidate could be judged on is told here, as the mistake it is, and not as each one's failure.
     next(splits(len(X), groups))
     metrics.explained(actions, np.zeros_like(actions))

@@ -27,11 +27,9 @@ def test_the_policy_is_saved_and_held_against_ordinary_regression(run, movements
 
 
 def test_a_policy_that_loses_to_ordinary_regression_says_so(run, tmp_path):
-    # A free turn about the origin, every action whole: the direction across it is what inconsistency leaves out.
-    angle = np.linspace(0.0, 6.0, 200)
-    X = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    U = X @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    write_csv(uc.Demonstrations(X, U, np.repeat(np.arange(10), 20)), tmp_path / "free.csv")
+    # Free movements, every action whole: the direction across it is what inconsistency leaves out.
+    free = toy.demonstrate(6, constrained=False, random_state=0)
+    write_csv(uc.Demonstrations(free.states, free.actions, free.episodes), tmp_path / "free.csv")
     for risk, rival in (("inconsistency", "direct"), ("direct", "inconsistency")):
         code, out, err = run(
             "fit", "free.csv", *COLUMNS, "--model", "locally-linear", "--risk", risk, "--out", f"{risk}.skops"

@@ -125,7 +125,8 @@ def test_bounds_hold_for_policies_in_the_span(seed, d, off):
     policy.solution_ = replace(policy.solution_, w=w + off * rng.normal(size=w.shape))
     report = uc.identifiability(policy, X, U)
     (one,) = compute_directions(report.information)
-    true = np.hstack([W.T, np.zeros((d, 1))]).ravel()
+    standard = policy.features_.scaling_
+    true = np.hstack([W.T * standard.spread, W.T @ standard.mean[:, None]]).ravel()
     (G,) = report.information.whole
     parts = one.vectors.T @ np.kron(np.eye(d), G) @ (policy.weights_ - true)
     weight = float(report.information.moments.weight)

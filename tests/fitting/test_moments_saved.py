@@ -10,6 +10,7 @@ import unconstrain as uc
 from unconstrain import storage
 from unconstrain.fitting import moments
 from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.samples import Samples
 
 RNG = np.random.default_rng(0)
 X = RNG.normal(size=(300, 2))
@@ -24,6 +25,9 @@ def fitted(alpha="cv"):
 def assert_equal(a, b):
     for name in ("H", "g", "squares", "weight", "n_samples"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    assert (a.everywhere is None) == (b.everywhere is None)
+    if a.everywhere is not None:
+        assert_equal(a.everywhere, b.everywhere)
 
 
 def test_moments_come_back_bit_by_bit(tmp_path):
@@ -52,10 +56,15 @@ def test_moments_of_local_models_are_copied_pickled_and_saved_alike(tmp_path):
 
 
 def test_moments_of_two_days_add_to_those_of_both(tmp_path):
-    moments.save(fitted(1e-6).moments_, tmp_path / "yesterday.npz")
-    today = uc.ParametricPolicy(alpha=1e-6).fit(X[200:], U[200:])
-    total = moments.load(tmp_path / "yesterday.npz")[0] + today.moments_[0]
-    both = uc.ParametricPolicy(alpha=1e-6).fit(X, U).moments_[0]
+    yesterday = fitted(1e-6)
+    moments.save(yesterday.moments_, tmp_path / "yesterday.npz")
+    today, both = (
+        yesterday.resume().empty(),
+        yesterday.resume().empty(),
+    )  # under the same model: features and all
+    today.add(Samples(X[200:], U[200:]))
+    both.add(Samples(X, U))
+    total, both = moments.load(tmp_path / "yesterday.npz")[0] + today.moments(), both.moments()
     np.testing.assert_allclose(total.H, both.H, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(total.g, both.g, rtol=1e-12, atol=1e-12)
     assert total.n_samples == 300

@@ -1,6 +1,7 @@
 """What is known of constraints is learnt from, and what is not known changes nothing."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from sklearn.base import clone
 
@@ -9,6 +10,7 @@ from reproduction.plants import arm
 from tests.problems import problems
 from unconstrain import constraints
 from unconstrain import metrics as risk
+from unconstrain.fitting.decay import SHARE
 
 
 def hidden(N, share, rng):
@@ -38,11 +40,55 @@ def test_known_projections_are_learnt_from_by_the_error_under_them(problem):
     if not np.any(U):
         return
     policy = uc.ParametricPolicy(alpha=1e-3).fit(X, U, projections=N)
-    V = np.einsum("nij,nk->nijk", N, np.column_stack([X, np.ones(len(X))])).reshape(U.size, -1)
-    expected = np.linalg.solve(V.T @ V + 1e-3 * np.eye(V.shape[1]), V.T @ U.reshape(-1))
-    B = np.column_stack([X, np.ones(len(X))])
+    # States count from their mean in units of their spread, both weighted by how much each projection shows.
+    shown = np.einsum("nij,nij->n", N, N)
+    mean = np.average(X, axis=0, weights=shown)
+    spread = np.sqrt(np.average((X - mean) ** 2, axis=0, weights=shown))
+    if np.any(spread < 1e-6 * X.std(axis=0)):  # one sample shows anything at all
+        return
+    B = np.column_stack([(X - mean) / spread, np.ones(len(X))])
+    V = np.einsum("nij,nk->nijk", N, B).reshape(U.size, -1)
+    H = V.T @ V
+    slopes = np.tile(np.arange(B.shape[1]) < X.shape[1], U.shape[1])
+    decay = 1e-3 * np.mean(np.diagonal(H)[slopes]) * np.where(slopes, 1.0, SHARE)
+    expected = np.linalg.solve(H + np.diag(decay), V.T @ U.reshape(-1))
     P = B @ expected.reshape(U.shape[1], -1).T
     np.testing.assert_allclose(policy.predict(X), P, rtol=1e-5, atol=1e-6 * np.abs(P).max())
+
+
+@pytest.mark.parametrize("cause", ["I minus it", "row before", "row after", "frame"])
+def test_a_projection_that_blocks_its_own_action_is_refused_with_the_likely_cause(cause):
+    demos = arm.demonstrate("1-3-5", n_episodes=4, length=30, random_state=0)
+    X, U, N = demos.states, demos.actions, demos.projections.copy()
+    N[::3] = np.nan
+    given = {
+        "I minus it": np.eye(U.shape[1]) - N,
+        "row before": N,
+        "row after": N,
+        "frame": N[:, ::-1, ::-1],
+    }[cause]
+    if cause.startswith("row"):  # directions that change from row to row, as in a wiped bowl
+        angle = np.linspace(0, 80, 80)
+        U = np.column_stack([np.cos(angle), np.sin(angle)])
+        N, X = U[:, :, None] * U[:, None, :], U
+        given = np.roll(N, -1 if cause == "row before" else 1, axis=0)
+    uc.ParametricPolicy(alpha=1e-3).fit(X, U, projections=N)
+    for ask in (
+        lambda: uc.ParametricPolicy(alpha=1e-3).fit(X, U, projections=given),
+        lambda: uc.select_policy([uc.ParametricPolicy()], X, U, projections=given),
+        lambda: uc.identifiability(uc.ParametricPolicy(alpha=1e-3).fit(X, U), X, U, projections=given),
+        lambda: uc.fit_stream(uc.ParametricPolicy(alpha=1e-3), [(X, U, np.zeros(len(X)), given)]),
+    ):
+        with pytest.raises(uc.errors.DataError, match=rf"row \d+ does not let through .*{cause}"):
+            ask()
+
+
+def test_noise_and_the_moment_of_contact_are_not_refused():
+    rng = np.random.default_rng(0)
+    demos = arm.demonstrate("1-3-5", n_episodes=4, length=30, random_state=0)
+    U = demos.actions + 0.2 * np.sqrt(np.mean(demos.actions**2)) * rng.normal(size=demos.actions.shape)
+    U[::7] *= 1e-3  # next to rest the action is all noise
+    uc.ParametricPolicy(alpha=1e-3).fit(demos.states, U, projections=demos.projections)
 
 
 def test_a_sample_at_rest_teaches_where_its_constraint_is_known():

@@ -122,7 +122,7 @@ class Graph:
         Parameters
         ----------
         centers : ndarray of shape (M, n)
-        width : ndarray of shape ()
+        width : ndarray of shape (n,)
 
         Returns
         -------

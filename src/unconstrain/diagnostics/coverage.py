@@ -34,7 +34,9 @@ class Coverage:
     directions: np.ndarray
 
 
-def compute_coverage(X: np.ndarray, recorded: np.ndarray, actions: np.ndarray, width: float) -> Coverage:
+def compute_coverage(
+    X: np.ndarray, recorded: np.ndarray, actions: np.ndarray, width: float | np.ndarray
+) -> Coverage:
     """Compute the directions of motion that were observed near states.
 
     Parameters
@@ -45,7 +47,7 @@ def compute_coverage(X: np.ndarray, recorded: np.ndarray, actions: np.ndarray, w
         States of the recorded movements.
     actions : ndarray of shape (N, d)
         Actions of the recorded movements.
-    width : float
+    width : float or ndarray of shape (n,)
         Width σ, in the unit of the states.
 
     Returns

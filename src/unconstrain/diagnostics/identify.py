@@ -7,6 +7,7 @@ from sklearn.utils.validation import check_is_fitted
 from unconstrain.arrays import (
     check_actions,
     check_groups,
+    check_lets_through,
     check_number,
     check_projections,
     check_squarable,
@@ -133,7 +134,8 @@ def check_recordings(
     Raises
     ------
     DataError
-        The arrays do not fit together or do not fit the policy, or nothing moves.
+        The arrays do not fit together or do not fit the policy, nothing moves, or a known projection does not let its
+        sample's own action through.
     """
     states, actions = check_states(policy, X), check_actions(U)
     check_squarable("the actions U", actions)
@@ -146,6 +148,7 @@ def check_recordings(
     counted, known = moving(actions), None
     if projections is not None:
         known = check_projections(projections, *actions.shape, unknown=True)
+        check_lets_through(known, actions)
         counted |= informative(known)
     counted &= weights > 0
     if not counted.any():

@@ -6,8 +6,10 @@ import numpy as np
 
 from unconstrain.diagnostics.coverage import compute_coverage
 from unconstrain.features.centers import farthest_first
+from unconstrain.features.scaling import Scaling
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.policies.base import Policy
+from unconstrain.receptive import squared_distances
 from unconstrain.samples import Samples
 
 POOL = 200
@@ -40,7 +42,7 @@ class Region:
 
 
 def find_worst_regions(
-    policy: Policy, posterior: Posterior, samples: Samples, k: int, reach: float
+    policy: Policy, posterior: Posterior, samples: Samples, k: int, reach: np.ndarray
 ) -> list[Region]:
     """Find the recorded states, apart from each other, where the policy is known least.
 
@@ -54,26 +56,28 @@ def find_worst_regions(
         The recordings.
     k : int
         How many at most.
-    reach : float
-        How far "near" a state reaches, in units of the states.
+    reach : ndarray of shape (n,)
+        How far "near" a state reaches along each of the states, in its unit.
 
     Returns
     -------
     list of Region
         By the posterior's largest standard deviation, the worst first.
     """
-    pool, radius = farthest_first(samples.states, n_centers=POOL)
+    near = Scaling(samples.states.mean(axis=0), reach)
+    pool, radius = farthest_first(samples.states, scaling=near, n_centers=POOL)
+    distances = np.sqrt(squared_distances(near(pool), near(pool)))
     covariance = policy.covariance(pool, posterior)
     speeds = np.linalg.norm(np.reshape(policy.predict(pool), (len(pool), -1)), axis=1)
     order = np.argsort(np.linalg.eigvalsh(covariance)[:, -1])[::-1]
     chosen: list[int] = []
     for i in order.tolist():
-        apart = min((np.linalg.norm(pool[i] - pool[j]) for j in chosen), default=np.inf)
-        if len(chosen) < k and apart > max(2 * radius, 2 * reach):
+        apart = distances[i, chosen].min(initial=np.inf)
+        if len(chosen) < k and apart > 2 * max(radius, 1.0):
             chosen.append(i)
-    near = compute_coverage(pool[chosen], samples.states, samples.actions, reach)
+    observed = compute_coverage(pool[chosen], samples.states, samples.actions, reach)
     regions = []
-    for i, share, q in zip(chosen, near.shares[:, 0], near.directions[:, 0], strict=True):
+    for i, share, q in zip(chosen, observed.shares[:, 0], observed.directions[:, 0], strict=True):
         deviation = float(np.sqrt(max(q @ covariance[i] @ q, 0.0)))
         regions.append(Region(pool[i], orient(q), deviation, float(speeds[i]), float(share)))
     return regions

@@ -8,7 +8,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import check_actions, check_choice, check_number, check_states
+from unconstrain.arrays import check_actions, check_choice, check_number, check_states, check_widths
 from unconstrain.diagnostics.advice import CRITERIA, PlannedRecording, Planner
 from unconstrain.diagnostics.bound import bound_directions, compute_bounds
 from unconstrain.diagnostics.coverage import Coverage, compute_coverage
@@ -19,6 +19,7 @@ from unconstrain.diagnostics.spectrum import compute_shares
 from unconstrain.diagnostics.words import describe
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import farthest_first
+from unconstrain.features.scaling import Scaling
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import directions as unit_directions
 from unconstrain.policies.base import Policy
@@ -124,7 +125,8 @@ class Identifiability:
     @cached_property
     def posterior(self) -> Posterior:
         """The distribution of the parameters, given these recordings."""
-        return Posterior.of(self.information.moments)
+        moments = self.information.moments
+        return Posterior.of(moments, decay=self.policy.model_.decay(moments))
 
     def covariance(self, X: ArrayLike) -> np.ndarray:
         """Compute how far the policy may be from `predict(X)`.
@@ -146,15 +148,15 @@ class Identifiability:
         """
         return self.policy.covariance(X, self.posterior)
 
-    def unseen_directions(self, X: ArrayLike, reach: float | None = None) -> Coverage:
+    def unseen_directions(self, X: ArrayLike, reach: ArrayLike | None = None) -> Coverage:
         """Compute the directions of motion that were observed near states, the least observed first.
 
         Parameters
         ----------
         X : array_like of shape (Q, n)
             States.
-        reach : float, optional
-            Width σ of what "near" means, in units of the states; `self.reach` by default.
+        reach : float or array_like of shape (n,), optional
+            Width σ of what "near" means, in units of the states, of all or of each; `self.reach` by default.
 
         Returns
         -------
@@ -167,19 +169,19 @@ class Identifiability:
             The states do not fit the policy, or the report is of moments alone.
         """
         samples = self.require_samples("which directions were observed near a state")
-        width = self.reach if reach is None else check_number(reach, "reach", positive=True)
+        n = samples.states.shape[1]
+        width = self.reach if reach is None else check_widths(reach, "reach", n)
         return compute_coverage(check_states(self.policy, X), samples.states, samples.actions, width)
 
     @property
-    def reach(self) -> float:
-        """Scott's rule for the recorded states, `s N^(-1/(n+4))`, s the root of their mean variance over dimensions.
+    def reach(self) -> np.ndarray:
+        """Scott's rule for the recorded states, `s N^(-1/(n+4))` along each, s its standard deviation, (n,).
 
         It is not the model's width: how far a model generalises is an assumption, what was observed near a state is
         not.
         """
         X = self.require_samples("how far apart the states lie").states
-        spread = float(np.sqrt(np.mean(np.var(X, axis=0))))
-        return spread * len(X) ** (-1.0 / (X.shape[1] + 4)) or 1.0
+        return Scaling.of(X).spread * len(X) ** (-1.0 / (X.shape[1] + 4))
 
     def worst_regions(self, k: int = 3) -> list[Region]:
         """Find the recorded states, apart from each other, where the policy is known least.
@@ -304,7 +306,8 @@ class Identifiability:
         """
         if candidates is None:
             samples = self.require_samples("where to record")
-            candidates = farthest_first(samples.states, n_centers=POOL)[0]
+            X = samples.states
+            candidates = farthest_first(X, scaling=Scaling.of(X), n_centers=POOL)[0]
         if length is None:
             episodes = self.episodes
             length = 1.0 if episodes is None else len(episodes) / len(np.unique(episodes))

@@ -12,6 +12,8 @@ A feature map has three methods, and may have more. Each further method is a cap
 | `along(X, directions)`          | yes    | everything that adds up samples or measures uncertainty                   |
 | `evaluate(X, w)`                | yes    | `predict`                                                                 |
 | `basis(X)`                      | no     | the fast kernels: it says that `π(x) = W b(x)` with W free      |
+| `decay_basis(second)`           | no     | the weight decay: how a basis is standardised, its intercepts            |
+| `linear(w)`                     | no     | `coef_` and `intercept_`, and compiling local models                      |
 | `compile(w)`                    | no     | `policy.compile()`, for the control loop                                  |
 
 `fit` may take `sample_weight` as a third argument.
@@ -101,6 +103,48 @@ class FullBasis(Features, Protocol):
         -------
         ndarray of shape (N, M)
             `b(x)`, in double precision.
+        """
+        ...
+
+
+@runtime_checkable
+class Decaying(Protocol):
+    """A basis of which not every combination decays alike. Without this method every parameter does."""
+
+    def decay_basis(self, second: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+        """Say which combinations of the basis functions the weight decay acts on.
+
+        Parameters
+        ----------
+        second : ndarray of shape (M, M)
+            Sum of `b(x) b(x)ᵀ` over the samples.
+
+        Returns
+        -------
+        basis : ndarray of shape (M, M) or None
+            B: in each row of W the decay acts on w' with `w = B w'`. None for the identity.
+        intercepts : ndarray of shape (M,), bool
+            Which w' are intercepts, that hardly decay.
+        """
+        ...
+
+
+@runtime_checkable
+class LinearInState(Protocol):
+    """A feature map whose policy is `W x + t`."""
+
+    def linear(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Split parameters into slopes and intercepts, in the units of the user's states.
+
+        Parameters
+        ----------
+        w : ndarray of shape (..., P)
+            Parameters.
+
+        Returns
+        -------
+        tuple of ndarray of shape (..., d, n) and ndarray of shape (..., d), or None
+            None where the policy is not linear in the state after all.
         """
         ...
 

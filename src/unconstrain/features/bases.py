@@ -21,6 +21,7 @@ from sklearn.preprocessing import PolynomialFeatures, SplineTransformer
 
 from unconstrain.errors import PolicyError
 from unconstrain.features.polynomials import Polynomials
+from unconstrain.features.scaling import Scaling
 from unconstrain.features.splines import EXTRAPOLATIONS, Splines
 
 if TYPE_CHECKING:
@@ -134,6 +135,59 @@ def adapted(transformer: Any) -> Any:
         The transformer itself, but for those of scikit-learn's in the table.
     """
     return ADAPTERS.get(type(transformer), lambda itself: itself)(transformer)
+
+
+def scaling_for(
+    transformer: Any, X: np.ndarray, sample_weight: np.ndarray | None = None, *, constant: bool = True
+) -> Scaling | None:
+    """Choose what a transformer gets in place of the states.
+
+    Polynomials of standardised states are the same policies as polynomials of the states, and do not hang on units.
+    `NormalizedRBF` and splines are placed among the states whatever their units, and of any other transformer it is
+    not known whether it means the numbers as they are.
+
+    Parameters
+    ----------
+    transformer : transformer
+        Not fitted.
+    X : ndarray of shape (N, n)
+        States.
+    sample_weight : ndarray of shape (N,), optional
+        Weight of each sample, 1 by default.
+    constant : bool
+        Whether a constant matters; it does not to a potential.
+
+    Returns
+    -------
+    Scaling or None
+        None for the states as they are.
+    """
+    if type(transformer) is not PolynomialFeatures:
+        return None
+    scaling = Scaling.of(X, sample_weight)
+    lowest = 0 if np.ndim(transformer.degree) == 0 else transformer.degree[0]
+    if lowest <= 1 and (transformer.include_bias or not constant):
+        return scaling
+    # Without a constant or linear terms, polynomials of moved states are other policies: the origin is the user's.
+    return Scaling(np.zeros_like(scaling.mean), np.hypot(scaling.spread, scaling.mean))
+
+
+def constant_outputs(transformer: Any) -> np.ndarray:
+    """Find the outputs of a fitted transformer that are known to be one at every state.
+
+    Parameters
+    ----------
+    transformer : transformer
+        Fitted.
+
+    Returns
+    -------
+    ndarray of int
+        Their columns. Where functions add up to a constant, as RBFs and splines do, there is none.
+    """
+    if type(transformer) is not PolynomialFeatures:
+        return np.zeros(0, dtype=int)
+    return np.flatnonzero(transformer.powers_.sum(axis=1) == 0)
 
 
 def differentiable(transformer: Any) -> Differentiable:

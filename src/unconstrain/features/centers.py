@@ -1,7 +1,9 @@
 """Where the centres of Gaussian receptive fields go, and how wide the fields are.
 
-`width` is σ of `exp(-‖x - c‖² / 2σ²)` throughout, in the unit of the states. No placement depends on the order of the
-samples, so neither does a policy built on it.
+`width` is σ of `exp(-‖x - c‖² / 2σ²)` throughout, one number for each dimension of the states, in its unit. Where it is
+given as one number, distances are as they stand; where it is not given, each dimension is measured in units of its own
+spread, so that where centres lie and how far they reach does not depend on the units of the states. No placement
+depends on the order of the samples, so neither does a policy built on it.
 """
 
 from numbers import Real
@@ -9,8 +11,9 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import check_choice, check_finite, check_numbers, check_whole, quote
+from unconstrain.arrays import check_choice, check_finite, check_numbers, check_whole, check_widths, quote
 from unconstrain.errors import PolicyError
+from unconstrain.features.scaling import Scaling
 from unconstrain.memory import check_memory
 from unconstrain.parallel import cut_blocks
 from unconstrain.receptive import squared_distances
@@ -28,11 +31,11 @@ def place_centers(
     centers: str | ArrayLike,
     *,
     n_centers: int,
-    width: float | None,
+    width: float | ArrayLike | None,
     coverage: float,
     sample_weight: np.ndarray | None = None,
     random_state: int | None = None,
-) -> tuple[np.ndarray, float]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Place centres for some states, and choose the width of their receptive fields.
 
     Parameters
@@ -46,21 +49,22 @@ def place_centers(
         covers. An array is taken as it is.
     n_centers : int
         How many, where neither the centres themselves nor a width says so.
-    width : float or None
-        Width σ; None takes it from the coverage, or for other placements from the spacing of the centres.
+    width : float, array_like of shape (n,), or None
+        Width σ, of all dimensions or of each; None takes it from the coverage, or for other placements from the spacing
+        of the centres, in units of each dimension's spread.
     coverage : float
         Between 0 and 1, for "coverage".
     sample_weight : ndarray of shape (N,), optional
-        Weight of each state, for "kmeans".
+        Weight of each state, for "kmeans" and the spread.
     random_state : int, optional
         Seed, for "kmeans".
 
     Returns
     -------
     centers : ndarray of shape (M, n)
-        The centres.
-    width : float
-        Their width σ.
+        The centres, in the states' units.
+    width : ndarray of shape (n,)
+        Their width σ along each dimension, in its unit.
 
     Raises
     ------
@@ -69,19 +73,32 @@ def place_centers(
     DataError
         So many centres do not fit into memory.
     """
+    n = X.shape[1]
+    scaling = Scaling.of(X, sample_weight)
+    if width is None:
+        unit, sigma = scaling.spread, None
+    else:  # one number leaves distances as they stand, and n numbers are units as well
+        widths = check_widths(width, "width", n)
+        unit, sigma = (np.ones(n), float(widths[0])) if np.ndim(width) == 0 else (widths, 1.0)
     if not isinstance(centers, str):
         placed = np.atleast_2d(check_numbers(centers, "centers")).copy()
-        if placed.ndim != 2 or placed.shape[1] != X.shape[1] or not len(placed):
-            raise PolicyError(f"centers must be (M, {X.shape[1]}) for these states, got shape {placed.shape}")
+        if placed.ndim != 2 or placed.shape[1] != n or not len(placed):
+            raise PolicyError(f"centers must be (M, {n}) for these states, got shape {placed.shape}")
         check_finite(placed, "centers")
-        return placed, _spacing_width(placed, X) if width is None else width
-    check_choice(centers, "centers", PLACEMENTS)
-    n_centers = check_whole(n_centers, "n_centers", least=1)
-    if centers == "coverage":
-        return _cover(X, int(n_centers), width, coverage)
-    by_grid = centers == "grid"
-    placed = grid(X, int(n_centers)) if by_grid else kmeans(X, int(n_centers), sample_weight, random_state)
-    return placed, _spacing_width(placed, X) if width is None else width
+    else:
+        check_choice(centers, "centers", PLACEMENTS)
+        n_centers = check_whole(n_centers, "n_centers", least=1)
+        measured = Scaling(scaling.mean, unit)
+        if centers == "coverage":
+            placed, sigma = _cover(X, measured, int(n_centers), sigma, coverage)
+        elif centers == "grid":
+            placed = grid(X, int(n_centers))
+        else:
+            found = kmeans(measured(X), int(n_centers), sample_weight, random_state)
+            placed = measured.mean + measured.spread * found
+    if sigma is None:
+        sigma = _spacing_width(Scaling(scaling.mean, unit), placed, X)
+    return placed, unit * sigma
 
 
 def grid(X: np.ndarray, n_centers: int) -> np.ndarray:
@@ -156,7 +173,7 @@ def kmeans(
 
 
 def farthest_first(
-    X: np.ndarray, *, n_centers: int | None = None, radius: float = 0.0
+    X: np.ndarray, *, scaling: Scaling | None = None, n_centers: int | None = None, radius: float = 0.0
 ) -> tuple[np.ndarray, float]:
     """Choose states one after the other, each the farthest from all chosen before (farthest-first traversal).
 
@@ -167,6 +184,8 @@ def farthest_first(
     ----------
     X : ndarray of shape (N, n)
         States.
+    scaling : Scaling, optional
+        Of which distances are taken; by default as they stand.
     n_centers : int, optional
         How many to choose at most.
     radius : float
@@ -183,28 +202,31 @@ def farthest_first(
     ----------
     Gonzalez, Clustering to minimize the maximum intercluster distance, 1985.
     """
-    nearest = squared_distances(X, (X.min(axis=0, keepdims=True) + X.max(axis=0, keepdims=True)) / 2)[:, 0]
+    Z = X if scaling is None else scaling(X)
+    nearest = squared_distances(Z, (Z.min(axis=0, keepdims=True) + Z.max(axis=0, keepdims=True)) / 2)[:, 0]
     chosen = [_first_of(X, nearest == nearest.min())]
-    nearest = squared_distances(X, X[chosen])[:, 0]
+    nearest = squared_distances(Z, Z[chosen])[:, 0]
     while True:
         farthest = nearest.max()
         # Roots are compared: the square of a radius may be more or less than double precision holds.
         if np.sqrt(farthest) <= radius or len(chosen) == n_centers:
             return X[chosen], float(np.sqrt(farthest))
         chosen.append(_first_of(X, nearest == farthest))
-        np.minimum(nearest, squared_distances(X, X[chosen[-1:]])[:, 0], out=nearest)
+        np.minimum(nearest, squared_distances(Z, Z[chosen[-1:]])[:, 0], out=nearest)
 
 
-def _cover(X: np.ndarray, n_centers: int, width: float | None, coverage: float) -> tuple[np.ndarray, float]:
+def _cover(
+    X: np.ndarray, scaling: Scaling, n_centers: int, width: float | None, coverage: float
+) -> tuple[np.ndarray, float | None]:
     """Place centres among the states so that each has an activation of at least `coverage` in one of them."""
     if not (isinstance(coverage, Real) and 0 < coverage < 1):
         raise PolicyError(f"coverage must be a number between 0 and 1, got {quote(coverage)}")
     # exp(-r² / 2σ²) = coverage at the edge of what a centre covers.
     widths = float(np.sqrt(-2.0 * np.log(coverage)))
     if width is not None:
-        return farthest_first(X, radius=widths * width)[0], width
-    placed, radius = farthest_first(X, n_centers=n_centers)
-    return placed, radius / widths if radius > 0 else _spacing_width(placed, X)
+        return farthest_first(X, scaling=scaling, radius=widths * width)[0], width
+    placed, radius = farthest_first(X, scaling=scaling, n_centers=n_centers)
+    return placed, radius / widths if radius > 0 else None
 
 
 def _first_of(X: np.ndarray, tied: np.ndarray) -> int:
@@ -213,14 +235,15 @@ def _first_of(X: np.ndarray, tied: np.ndarray) -> int:
     return int(rows[0] if len(rows) == 1 else rows[np.lexsort(X[rows].T)[0]])
 
 
-def _spacing_width(centers: np.ndarray, X: np.ndarray) -> float:
+def _spacing_width(scaling: Scaling, centers: np.ndarray, X: np.ndarray) -> float:
     """Take `WIDTH_PER_SPACING` times the mean distance to the nearest other centre, or the spread of the states."""
-    nearest = np.empty(len(centers))
-    for rows in cut_blocks(len(centers), max(1, DISTANCES_IN_BLOCK // len(centers))):
-        distances = squared_distances(centers[rows], centers)
+    placed = scaling(centers)
+    nearest = np.empty(len(placed))
+    for rows in cut_blocks(len(placed), max(1, DISTANCES_IN_BLOCK // len(placed))):
+        distances = squared_distances(placed[rows], placed)
         distances[distances == 0] = np.inf
         nearest[rows] = distances.min(axis=1)
     nearest = nearest[np.isfinite(nearest)]
     if len(nearest):
         return WIDTH_PER_SPACING * float(np.mean(np.sqrt(nearest)))
-    return float(np.sqrt(np.sum(np.var(X, axis=0)))) or 1.0
+    return float(np.sqrt(np.sum(np.var(scaling(X), axis=0)))) or 1.0

@@ -41,7 +41,9 @@ class DecoupledFeatures(BaseEstimator):
     Parameters
     ----------
     n_knots : int
-        Knots in each dimension, evenly over the data's range; each dimension has n_knots + degree - 1 parameters.
+        Knots in each dimension, evenly over the data's range; each dimension has n_knots + degree - 1 parameters. The
+        weight decay makes the policy smooth where more knots than needed are given, so there are enough of them for
+        policies with a corner.
     degree : int
         Of the polynomials between knots.
     extrapolation : {"linear", "constant", "continue"}
@@ -68,7 +70,7 @@ class DecoupledFeatures(BaseEstimator):
     True
     """
 
-    def __init__(self, n_knots: int = 15, *, degree: int = 3, extrapolation: str = "linear"):
+    def __init__(self, n_knots: int = 31, *, degree: int = 3, extrapolation: str = "linear"):
         self.n_knots = n_knots
         self.degree = degree
         self.extrapolation = extrapolation

@@ -17,7 +17,14 @@ from unconstrain.arrays import quote
 from unconstrain.deploy.compiled import CompiledPolicy, Linear
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import Features, fit_transformer, is_feature_map
-from unconstrain.features.bases import Compilable, adapted, compilation_error
+from unconstrain.features.bases import (
+    Compilable,
+    adapted,
+    compilation_error,
+    constant_outputs,
+    scaling_for,
+)
+from unconstrain.features.scaling import NO_SPREAD, Scaling
 
 
 class FullFeatures(BaseEstimator):
@@ -26,12 +33,15 @@ class FullFeatures(BaseEstimator):
     Parameters
     ----------
     transformer : scikit-learn transformer, optional
-        Its output is `b(x)`. It is cloned, never changed. None stands for the linear policy, `b(x) = (x, 1)`.
+        Its output is `b(x)`. It is cloned, never changed. None stands for the linear policy, `b(x) = (z, 1)` with z
+        the standardised state. Polynomials are of z as well; other transformers get the state as it is.
 
     Attributes
     ----------
     transformer_ : transformer or None
         The fitted copy.
+    scaling_ : Scaling or None
+        Of the states that the basis is a function of; None for the state as it is.
     n_actions_ : int
         d.
 
@@ -67,9 +77,14 @@ class FullFeatures(BaseEstimator):
         self
             Fitted.
         """
-        self.transformer_ = (
-            None if self.transformer is None else fit_transformer(self.transformer, X, sample_weight)
-        )
+        self.scaling_: Scaling | None
+        if self.transformer is None:
+            self.scaling_ = Scaling.of(X, sample_weight)
+            self.transformer_ = None
+        else:
+            self.scaling_ = scaling_for(self.transformer, X, sample_weight)
+            Z = X if self.scaling_ is None else self.scaling_(X)
+            self.transformer_ = fit_transformer(self.transformer, Z, sample_weight)
         self.n_actions_ = d
         return self
 
@@ -89,9 +104,13 @@ class FullFeatures(BaseEstimator):
         if self.transformer_ is None:
             # Stored a row a feature, as products are formed.
             rows = np.empty((X.shape[1] + 1, len(X)))
-            rows[:-1], rows[-1] = X.T, 1.0
+            mean, spread = self._standard
+            np.subtract(X.T, mean[:, None], out=rows[:-1])
+            rows[:-1] /= spread[:, None]
+            rows[-1] = 1.0
             return rows.T
-        B = self.transformer_.transform(X.astype(np.float64, copy=False))
+        Z = X.astype(np.float64, copy=False) if self.scaling_ is None else self.scaling_(X)
+        B = self.transformer_.transform(Z)
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -128,6 +147,54 @@ class FullFeatures(BaseEstimator):
         """
         return self.basis(X) @ w.reshape(self.n_actions_, -1).T
 
+    def decay_basis(self, second: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+        """Standardise linear features by their own moments, and name the intercept.
+
+        Parameters
+        ----------
+        second : ndarray of shape (M, M)
+            Sum of `b(x) b(x)ᵀ` over the samples.
+
+        Returns
+        -------
+        basis : ndarray of shape (M, M) or None
+            None for features other than linear ones.
+        intercepts : ndarray of shape (M,), bool
+            The functions that are known to be constant.
+        """
+        M = len(second)
+        if self.transformer_ is not None:
+            return None, np.isin(np.arange(M), constant_outputs(self.transformer_))
+        weight = second[-1, -1] if second[-1, -1] > 0 else 1.0
+        mean, square = second[:-1, -1] / weight, np.diagonal(second)[:-1] / weight
+        spread = np.sqrt(np.maximum(square - mean**2, 0.0))
+        # What is left of a column without spread is rounding, also of the difference above.
+        spread = np.where(spread > NO_SPREAD + 1e-7 * np.abs(mean), spread, 1.0)
+        basis = np.eye(M)
+        basis[-1, :-1] = -mean / spread
+        basis[np.arange(M - 1), np.arange(M - 1)] = 1.0 / spread
+        return basis, np.arange(M) == M - 1
+
+    def linear(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Split the parameters of a linear policy into slopes and intercepts, in the units of the user's states.
+
+        Parameters
+        ----------
+        w : ndarray of shape (..., dM)
+            Parameters.
+
+        Returns
+        -------
+        tuple of ndarray of shape (..., d, n) and ndarray of shape (..., d), or None
+            None for features on a transformer.
+        """
+        if self.transformer_ is not None:
+            return None
+        W = w.reshape(*w.shape[:-1], self.n_actions_, -1)
+        mean, spread = self._standard
+        coef = W[..., :-1] / spread
+        return coef, W[..., -1] - coef @ mean
+
     def compile(self, w: np.ndarray) -> CompiledPolicy:
         """Compile the policy for a control loop.
 
@@ -146,13 +213,19 @@ class FullFeatures(BaseEstimator):
         PolicyError
             It is not known how policies on this transformer are compiled.
         """
-        W = w.reshape(self.n_actions_, -1)
-        if self.transformer_ is None:
-            return Linear(coef=W[:, :-1], intercept=W[:, -1])
+        linear = self.linear(w)
+        if linear is not None:
+            return Linear(coef=linear[0], intercept=linear[1])
         basis = adapted(self.transformer_)
         if not isinstance(basis, Compilable):
             raise compilation_error(self.transformer_)
-        return basis.compile(W)
+        return basis.compile(w.reshape(self.n_actions_, -1))
+
+    @property
+    def _standard(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and spread of the states that linear features count from and in."""
+        assert self.scaling_ is not None
+        return self.scaling_.mean, self.scaling_.spread
 
 
 def as_features(given: Any) -> Features:

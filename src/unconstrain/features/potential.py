@@ -12,7 +12,13 @@ from sklearn.base import BaseEstimator
 
 from unconstrain.deploy.compiled import CompiledPolicy
 from unconstrain.features.base import check_square, fit_transformer
-from unconstrain.features.bases import CompilableDescent, adapted, compilation_error, differentiable
+from unconstrain.features.bases import (
+    CompilableDescent,
+    adapted,
+    compilation_error,
+    differentiable,
+    scaling_for,
+)
 from unconstrain.features.rbf import NormalizedRBF
 
 BLOCK_ROWS = 4096
@@ -35,6 +41,8 @@ class PotentialFeatures(BaseEstimator):
     ----------
     transformer_ : transformer
         The fitted copy.
+    scaling_ : Scaling or None
+        Of the states that polynomials are functions of; None for other transformers, which get the state as it is.
 
     Examples
     --------
@@ -76,7 +84,8 @@ class PotentialFeatures(BaseEstimator):
         check_square("PotentialFeatures", X, d)
         transformer = NormalizedRBF(100) if self.transformer is None else self.transformer
         differentiable(transformer)
-        self.transformer_ = fit_transformer(transformer, X, sample_weight)
+        self.scaling_ = scaling_for(transformer, X, sample_weight, constant=False)
+        self.transformer_ = fit_transformer(transformer, self._standardize(X), sample_weight)
         return self
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -94,7 +103,8 @@ class PotentialFeatures(BaseEstimator):
         ndarray of shape (N, M)
             `v = -J_b(x) q`.
         """
-        V = differentiable(self.transformer_).slopes(X, directions)
+        q = directions if self.scaling_ is None else directions / self.scaling_.spread
+        V = differentiable(self.transformer_).slopes(self._standardize(X), q)
         return np.negative(V, out=V)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -116,8 +126,8 @@ class PotentialFeatures(BaseEstimator):
         actions = np.empty_like(X, dtype=np.float64)
         for start in range(0, len(X), BLOCK_ROWS):
             rows = slice(start, start + BLOCK_ROWS)
-            actions[rows] = -basis.gradient(X[rows], w)
-        return actions
+            actions[rows] = -basis.gradient(self._standardize(X[rows]), w)
+        return actions if self.scaling_ is None else actions / self.scaling_.spread
 
     def compile(self, w: np.ndarray) -> CompiledPolicy:
         """Compile the policy for a control loop.
@@ -157,4 +167,7 @@ class PotentialFeatures(BaseEstimator):
         ndarray of shape (N,)
             `Φ(x)`.
         """
-        return self.transformer_.transform(X) @ w
+        return self.transformer_.transform(self._standardize(X)) @ w
+
+    def _standardize(self, X: np.ndarray) -> np.ndarray:
+        return X if self.scaling_ is None else self.scaling_(X)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils.validation import check_is_fitted
 
-from unconstrain.arrays import check_number, check_states, check_weights
+from unconstrain.arrays import check_states, check_weights
 from unconstrain.deploy.compiled import Potential, RadialBasis
 from unconstrain.features.centers import place_centers
 from unconstrain.receptive import normalized_activations
@@ -26,9 +26,10 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
     ----------
     n_centers : int
         How many centres to place; for "grid" the most that may be, the same number along each dimension.
-    width : float, optional
-        Width σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit. None takes 1.5 times the centres' mean spacing (for
-        "coverage": the width that covers).
+    width : float or array_like of shape (n,), optional
+        Width σ of `exp(-‖x - c‖² / 2σ²)`, in the states' unit: one for all dimensions, or one for each. None takes 1.5
+        times the centres' mean spacing (for "coverage": the width that covers), with distances in units of each
+        dimension's spread.
     centers : {"kmeans", "grid", "coverage"} or array_like of shape (M, n)
         "grid" spans the data's range.
     coverage : float
@@ -40,8 +41,8 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
     ----------
     centers_ : ndarray of shape (M, n)
         The centres.
-    width_ : float
-        The width σ, in the states' unit.
+    width_ : ndarray of shape (n,)
+        The width σ along each dimension, in its unit.
 
     Examples
     --------
@@ -55,7 +56,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         self,
         n_centers: int = 36,
         *,
-        width: float | None = None,
+        width: Any = None,
         centers: Any = "kmeans",
         coverage: float = 0.7,
         random_state: int | None = 0,
@@ -98,7 +99,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
             X,
             self.centers,
             n_centers=self.n_centers,
-            width=None if self.width is None else check_number(self.width, "width", positive=True),
+            width=self.width,
             coverage=self.coverage,
             sample_weight=weights,
             random_state=self.random_state,
@@ -122,7 +123,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         return normalized_activations(check_states(self, X), self.centers_, self.width_)
 
     def slopes(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Compute the slopes of all basis functions, `b_i (qᵀc_i - Σ_j b_j qᵀc_j) / σ²`.
+        """Compute the slopes of all basis functions, `b_i (qᵀc_i - Σ_j b_j qᵀc_j)`, with q and c divided by σ.
 
         The state drops out, since `∇ log K_i = (c_i - x) / σ²`.
 
@@ -139,11 +140,10 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
             `qᵀ∇b_i(x)`.
         """
         B = normalized_activations(X, self.centers_, self.width_)
-        pulls = directions @ self.centers_.T
+        # Each is divided by σ: σ² may be more or less than double precision holds.
+        pulls = (directions / self.width_) @ self._away.T
         pulls -= np.einsum("nm,nm->n", B, pulls)[:, None]
         B *= pulls
-        B /= self.width_  # twice: σ² may be more or less than double precision holds
-        B /= self.width_
         return B
 
     def gradient(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -163,7 +163,7 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         """
         B = normalized_activations(X, self.centers_, self.width_)
         heights = B @ w
-        return ((B * (w - heights[:, None])) @ self.centers_) / self.width_ / self.width_
+        return ((B * (w - heights[:, None])) @ self._away) / self.width_
 
     def compile(self, W: np.ndarray) -> RadialBasis:
         """Compile the policy `W b(x)`.
@@ -194,6 +194,11 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
             The same policy, as arrays.
         """
         return Potential(centers=self.centers_, width=self.width_, weights=w)
+
+    @property
+    def _away(self) -> np.ndarray:
+        """The centres, counted from their mean in units of σ: a far origin would cost digits."""
+        return (self.centers_ - self.centers_.mean(axis=0)) / self.width_
 
     def get_feature_names_out(self, input_features: Any = None) -> np.ndarray:
         """Name the outputs rbf0, rbf1, ..., one for each centre.

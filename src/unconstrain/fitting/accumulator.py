@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
@@ -41,7 +42,7 @@ class Solution:
     w : ndarray of shape (P,) or (S, P)
         Parameters of the model, or of each of S models.
     alpha : float
-        The weight decay λ.
+        The weight decay λ, a pure number; see `fitting.decay`.
     alphas, held_out_risk : ndarray of shape (L,), optional
         The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
     n_samples, n_zero, n_known : int
@@ -146,13 +147,16 @@ class Accumulator:
         Raises
         ------
         DataError
-            An action is so long that hardly any other is motion beside it.
+            An action is so long that hardly any other is motion beside it, or a known projection does not let its
+            sample's own action through.
         """
         U = samples.actions
         r = lengths(U)
         longest = max(float(r.max(initial=0.0)), self.longest)
         moves = r > NO_MOTION * longest
         _check_outlier(r, moves)
+        if samples.projections is not None:
+            check_lets_through(samples.projections, U)
         counted = find_informative_samples(self.risk, samples, moves)
         observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
         moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
@@ -284,11 +288,11 @@ class Accumulator:
         alpha = self.alpha if alpha is None else alpha
         folds = self._folds(without)
         total = Moments.sum(folds)
+        decay = self.model.decay(total)
         if alpha != "cv":
-            return self._solution(total.solve(float(alpha)), float(alpha))
-        spectrum = total.decompose()
-        chosen, alphas, risk = choose_alpha(folds, float(spectrum.values.max()))
-        return self._solution(spectrum.solve([chosen])[..., 0, :], chosen, alphas, risk)
+            return self._solution(decay.solve(total, float(alpha)), float(alpha))
+        chosen, alphas, risk = choose_alpha(folds, self.model.decay)
+        return self._solution(decay.solve(total, chosen), chosen, alphas, risk)
 
     def _solution(
         self,

@@ -7,6 +7,7 @@ import numpy as np
 
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import Compilable, Features, FullBasis
+from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.kernels import parametric
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
@@ -44,6 +45,10 @@ class GlobalModel:
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
         """Sum samples up; see `Model.moments`."""
         return parametric.moments(self.features, X, observation, weights)
+
+    def decay(self, moments: Moments) -> Decay:
+        """Say what the weight decay acts on; see `Model.decay`."""
+        return Decay.of(moments, self.features, self.n_actions)
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
         """Turn a solution of the moments into parameters; see `Model.parameters`."""

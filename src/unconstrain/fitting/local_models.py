@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from unconstrain.errors import PolicyError
-from unconstrain.features.base import Features, FullBasis
+from unconstrain.features.base import Features, FullBasis, LinearInState
+from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.global_model import GlobalModel
 from unconstrain.fitting.kernels import local
 from unconstrain.fitting.kernels.products import distinct_products, pairs
@@ -14,6 +15,8 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.receptive import activations, normalized_activations
+
+PRIORS = ("global", "zero")
 
 BLOCK_ROWS = 4096
 COVARIANCE_ROWS = 1024
@@ -23,7 +26,8 @@ COVARIANCE_ROWS = 1024
 class LocalModels:
     """`π(x) = Σ_m ω_m(x) Φ(x) w_m` with `ω_m = K_m / Σ_j K_j` and `K_m(x) = exp(-‖x - c_m‖² / 2σ²)`.
 
-    Each w_m minimises the risk with its samples weighted by K_m, whatever the other models do.
+    Each w_m minimises the risk with its samples weighted by K_m, whatever the other models do, and decays to what the
+    prior says.
 
     Parameters
     ----------
@@ -31,10 +35,12 @@ class LocalModels:
         Fitted; the same for every model.
     centers : ndarray of shape (M, n)
         Centres of the receptive fields.
-    width : float
+    width : float or ndarray of shape (n,)
         Width σ of the receptive fields, in the states' unit.
     n_actions : int
         Number d.
+    prior : {"global", "zero"}
+        What parameters decay to: those of the same features fitted to all samples together, or zero.
 
     References
     ----------
@@ -43,8 +49,9 @@ class LocalModels:
 
     features: Features
     centers: np.ndarray
-    width: float
+    width: float | np.ndarray
     n_actions: int
+    prior: str = "global"
 
     @property
     def n_states(self) -> int:
@@ -63,7 +70,14 @@ class LocalModels:
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
         """Sum samples up; see `Model.moments`."""
-        return local.moments(self.features, self.centers, self.width, X, observation, weights)
+        everywhere = self.prior == "global"
+        return local.moments(
+            self.features, self.centers, self.width, X, observation, weights, everywhere=everywhere
+        )
+
+    def decay(self, moments: Moments) -> Decay:
+        """Say what the weight decay acts on; see `Model.decay`."""
+        return Decay.of(moments, self.features, self.n_actions)
 
     def parameters(self, w: np.ndarray) -> np.ndarray:
         """Turn a solution of the moments into parameters; see `Model.parameters`."""
@@ -129,10 +143,7 @@ class LocalModels:
         tuple of ndarray of shape (M, d, n) and ndarray of shape (M, d), or None
             Slopes and offsets; None for features other than (x, 1).
         """
-        if getattr(self.features, "transformer_", w) is not None:
-            return None
-        models = w.reshape(len(w), self.n_actions, -1)
-        return models[:, :, :-1].copy(), models[:, :, -1].copy()
+        return self.features.linear(w) if isinstance(self.features, LinearInState) else None
 
     def _evaluate_each(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate every model, (N, M, d)."""

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from unconstrain.features.base import Features
+from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 from unconstrain.fitting.posterior import Posterior
@@ -60,6 +61,21 @@ class Model(Protocol):
         -------
         Moments
             With a leading axis of models where there are several.
+        """
+        ...
+
+    def decay(self, moments: Moments) -> Decay:
+        """Say what the weight decay acts on where these moments are solved.
+
+        Parameters
+        ----------
+        moments : Moments
+            Of this model.
+
+        Returns
+        -------
+        Decay
+            Which solves them.
         """
         ...
 

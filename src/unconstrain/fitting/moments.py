@@ -5,8 +5,9 @@ For any policy linear in its parameters, `π(x) = Φ(x) w`, any of the risks is
     E(w) = Σ_n ω_n ‖Q_n u_n - V_n w‖² = s - 2 gᵀw + wᵀH w,        V_n = Q_n Φ(x_n)
     H = Σ ω_n V_nᵀ V_n,    g = Σ ω_n V_nᵀ Q_n u_n,    s = Σ ω_n ‖Q_n u_n‖²
 
-and the weight decay λ gives `w = (H + λI)⁻¹ g`. Moments add: across blocks, episodes, folds, files and machines.
-Everything that is chosen or reported about a fit is computed from them.
+and a decay λ of all parameters gives `w = (H + λI)⁻¹ g`; which of them decay, and to what, is said in `fitting.decay`.
+Moments add: across blocks, episodes, folds, files and machines. Everything that is chosen or reported about a fit is
+computed from them.
 
 References
 ----------
@@ -45,6 +46,9 @@ class Moments:
         `Σ ω_n`.
     n_samples : int
         How many samples were added.
+    everywhere : Moments, optional
+        Beside those of local models, the moments of the same features with every sample in full: what local models
+        decay to is solved from them.
     """
 
     H: np.ndarray
@@ -52,6 +56,7 @@ class Moments:
     squares: np.ndarray
     weight: np.ndarray
     n_samples: int = 0
+    everywhere: "Moments | None" = None
 
     @classmethod
     def zeros(cls, batch: tuple[int, ...], n_parameters: int, n_targets: int) -> "Moments":
@@ -77,12 +82,14 @@ class Moments:
         )
 
     def __add__(self, other: "Moments") -> "Moments":
+        here, there = self.everywhere, other.everywhere
         return Moments(
             self.H + other.H,
             self.g + other.g,
             self.squares + other.squares,
             self.weight + other.weight,
             self.n_samples + other.n_samples,
+            None if here is None or there is None else here + there,
         )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -94,16 +101,19 @@ class Moments:
             "g": self.g,
             "squares": np.asarray(self.squares),
             "weight": np.asarray(self.weight),
+            "everywhere": self.everywhere,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.g, self.squares, self.weight = state["g"], state["squares"], state["weight"]
-        self.n_samples = int(state["n_samples"])
+        self.n_samples, self.everywhere = int(state["n_samples"]), state["everywhere"]
         *batch, P, _ = self.g.shape
         triangle = state["triangle"]
         if triangle.shape != (*batch, P * (P + 1) // 2) or not (
             self.squares.shape == self.weight.shape == tuple(batch)
         ):
+            raise ValueError("the shapes of moments do not go together")
+        if self.everywhere is not None and self.everywhere.g.shape != self.g.shape[-2:]:
             raise ValueError("the shapes of moments do not go together")
         self.H = np.empty((*batch, P, P))
         rows, columns = np.tril_indices(P)
@@ -223,13 +233,15 @@ class Spectrum:
         floor = self.values.shape[-1] * np.finfo(np.float64).eps * self.values[..., -1:]
         return self.values > np.maximum(floor, 0.0)
 
-    def solve(self, alphas: ArrayLike) -> np.ndarray:
-        """Solve for `w = (H + λI)⁺ g` of least norm for several λ.
+    def solve(self, alphas: ArrayLike, toward: np.ndarray | None = None) -> np.ndarray:
+        """Solve for `w = t + (H + λI)⁺ (g - Ht)` of least distance from t for several λ.
 
         Parameters
         ----------
         alphas : array_like of shape (L,)
             One λ for each.
+        toward : ndarray of shape (P, L, K), optional
+            Parameters t for each λ; by default zero.
 
         Returns
         -------
@@ -239,7 +251,15 @@ class Spectrum:
         alphas = np.asarray(alphas, dtype=np.float64)
         determined = self.determined[..., None]
         denominator = np.where(determined, self.values[..., None] + alphas, 1.0)
-        scaled = self.along[..., :, None, :] * (determined / denominator)[..., None]
+        if toward is None:
+            scaled = self.along[..., :, None, :] * (determined / denominator)[..., None]
+        else:
+            P, L, K = toward.shape
+            at = (self.vectors.swapaxes(-1, -2) @ toward.reshape(P, L * K)).reshape(
+                *self.values.shape[:-1], P, L, K
+            )
+            pulled = self.along[..., :, None, :] + alphas[:, None] * at
+            scaled = np.where(determined[..., None], pulled / denominator[..., None], at)
         *batch, P, L, K = scaled.shape
         return (self.vectors @ scaled.reshape(*batch, P, L * K)).reshape(scaled.shape)
 

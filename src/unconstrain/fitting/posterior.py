@@ -8,6 +8,17 @@ With `V_n w = Q_n Φ(x_n) w` observed through Gaussian noise of variance σ² an
 for the eigenvalues h of H and n observed numbers: σ² maximises the likelihood in closed form, λ is searched for on one
 axis. H, g, s and n are moments, so streams and clusters know how sure they are as well.
 
+All of this is about the parameters of standardised features (`fitting.decay`), so units do not matter. The prior is
+about the intercept too, unlike the weight decay: how far off an intercept may be that no sample shows is a finite
+number. Local models that decay to w_0, of all samples together, have it as the mean of their prior: with `w_0 ~ N(m_0,
+Σ_0)` and g - H m_0 in place of g, and s likewise,
+
+    m = m_0 + (H + λI)⁻¹ (g - H m_0),    Σ = σ² (H + λI)⁻¹ + A Σ_0 Aᵀ,    A = λ (H + λI)⁻¹,
+
+the second term since where a model knows nothing by itself, it is as unsure as w_0. How far local models are from w_0,
+the prior's variance σ²/λ, is the same for all of them and found from all of them: a model whose own data show no
+difference may still be as different as the others.
+
 What is reported of the policy at x is the second moment of its deviation from what `predict` returns,
 
     E (π(x) - p(x)) (π(x) - p(x))ᵀ = Φ Σ Φᵀ + (Φm - p)(Φm - p)ᵀ,
@@ -20,14 +31,18 @@ References
 MacKay, Bayesian interpolation, Neural Computation 4, 1992; here with σ² profiled out.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
 
 # Where λ is searched, relative to the largest eigenvalue of H, and at how many values before the search is refined.
 SMALLEST, LARGEST, N_TRIED = 1e-14, 1e6, 41
+
+# Where the variance of what local models differ by from all data is searched, relative to the mean squared action.
+NARROWEST, WIDEST = 1e-12, 1e4
 
 
 @dataclass(frozen=True)
@@ -55,7 +70,7 @@ class Posterior:
     log_evidence: np.ndarray
 
     @classmethod
-    def of(cls, moments: Moments, numbers_per_sample: int = 1) -> "Posterior":
+    def of(cls, moments: Moments, numbers_per_sample: int = 1, decay: Decay | None = None) -> "Posterior":
         """Compute the posterior that moments determine.
 
         Parameters
@@ -64,37 +79,78 @@ class Posterior:
             Of the samples.
         numbers_per_sample : int
             How many numbers each sample shows: 1, or d where nothing is projected.
+        decay : Decay, optional
+            Which parameters the prior is about; by default those that the moments are of.
 
         Returns
         -------
         Posterior
             Of the parameters.
         """
+        if decay is None:
+            return cls._of_standardized(moments, numbers_per_sample)
+        found = cls._of_standardized(decay.standardize(moments), numbers_per_sample)
+        covariance = decay.restore_covariance(found.covariance)
+        return replace(found, mean=decay.restore(found.mean), covariance=covariance)
+
+    @classmethod
+    def _of_standardized(cls, moments: Moments, numbers_per_sample: int) -> "Posterior":
+        if moments.everywhere is not None:
+            whole = cls._of_standardized(moments.everywhere, numbers_per_sample)
+            return cls._about(whole, moments, numbers_per_sample)
+        return cls._about_zero(moments, numbers_per_sample)[0]
+
+    @classmethod
+    def _about(cls, whole: "Posterior", moments: Moments, numbers_per_sample: int) -> "Posterior":
+        """Compute the posterior of local models about that of all samples together."""
+        m = whole.mean
+        Hm = moments.H @ m
+        squares = moments.squares + np.einsum("pk,...pk->...", m, Hm - 2 * moments.g)
+        apart = replace(moments, g=moments.g - Hm, squares=np.maximum(squares, 0.0), everywhere=None)
+        found, inverse = cls._about_zero(apart, numbers_per_sample, moments.squares, shared=True)
+        A = found.decay[..., None, None] * inverse
+        spread = A @ whole.covariance @ A
+        spread = (spread + spread.swapaxes(-1, -2)) / 2
+        return replace(found, mean=m + found.mean, covariance=found.covariance + spread)
+
+    @classmethod
+    def _about_zero(
+        cls,
+        moments: Moments,
+        numbers_per_sample: int,
+        sizes: np.ndarray | None = None,
+        *,
+        shared: bool = False,
+    ) -> tuple["Posterior", np.ndarray]:
+        """Compute the posterior about zero, and `(H + λI)⁻¹`; `sizes` are what s is rounded relative to."""
         from scipy.linalg import cho_factor, cho_solve
 
         batch, P = moments.squares.shape, moments.H.shape[-1]
-        search = _Evidence(moments, numbers_per_sample)
+        search = _Evidence(moments, numbers_per_sample, sizes)
         decay = search.decay()
         noise = search.noise(np.log(decay), search.every)
+        if shared:
+            decay = noise / search.shared_spread(noise)
         log_evidence = -search.surprise(np.log(decay), search.every)
         # Cholesky, not the eigenvectors at hand: it leaves Σ positive however wide the eigenvalues lie apart.
         regular = moments.H.reshape(-1, P, P) + decay[:, None, None] * np.eye(P)
         inverse = np.stack([cho_solve(cho_factor(one), np.eye(P)) for one in regular])
         inverse = ((inverse + inverse.swapaxes(-1, -2)) / 2).reshape(moments.H.shape)
         noise = noise.reshape(batch)
-        return cls(
+        found = cls(
             inverse @ moments.g,
             noise[..., None, None] * inverse,
             noise,
             decay.reshape(batch),
             log_evidence.reshape(batch),
         )
+        return found, inverse
 
 
 class _Evidence:
     """`-log p(data | λ)` of S models side by side, as a function of log λ."""
 
-    def __init__(self, moments: Moments, numbers_per_sample: int):
+    def __init__(self, moments: Moments, numbers_per_sample: int, sizes: np.ndarray | None = None):
         spectrum, P = moments.decompose(), moments.H.shape[-1]
         self.values = np.maximum(spectrum.values.reshape(-1, P), 0.0)
         pulls = np.sum(spectrum.along**2, axis=-1) * spectrum.determined
@@ -102,7 +158,8 @@ class _Evidence:
         self.squares = moments.squares.reshape(-1)
         tiny = np.finfo(np.float64).tiny
         self.n = np.maximum(moments.weight.reshape(-1) * numbers_per_sample, tiny)
-        self.floor = np.maximum(P * np.finfo(np.float64).eps * self.squares, tiny)
+        self.sizes = self.squares if sizes is None else sizes.reshape(-1)
+        self.floor = np.maximum(P * np.finfo(np.float64).eps * self.sizes, tiny)
         self.n_targets = moments.g.shape[-1]
         self.every = np.arange(len(self.squares))
 
@@ -116,6 +173,25 @@ class _Evidence:
         shrunk = np.sum(np.log1p(self.values[models] * np.exp(-log_decay)[..., None]), axis=-1)
         misfit = np.log(2 * np.pi * self.noise(log_decay, models)) + 1.0
         return 0.5 * (self.n[models] * misfit + self.n_targets * shrunk)
+
+    def shared_spread(self, noise: np.ndarray) -> float:
+        """Find the variance σ²/λ of the prior that all models share, given the noise σ² (S,) of each.
+
+        The parameters are standardised, so they are actions, and it is searched for about the square of those.
+        """
+        from scipy.optimize import minimize_scalar
+
+        def surprise(log_spread: float) -> float:
+            decay = noise / np.exp(log_spread)
+            shrunk = np.sum(np.log1p(self.values / decay[:, None]))
+            explained = np.sum(self.pulls / (self.values + decay[:, None]), axis=1)
+            return float(self.n_targets * shrunk - np.sum(explained / noise))
+
+        size = float(np.sum(self.sizes) / np.sum(self.n)) or 1.0
+        tried = np.log(np.geomspace(NARROWEST, WIDEST, N_TRIED) * size)
+        best = int(np.clip(np.argmin([surprise(each) for each in tried]), 1, N_TRIED - 2))
+        found = minimize_scalar(surprise, bounds=(tried[best - 1], tried[best + 1]), method="bounded")
+        return float(np.exp(found.x))
 
     def decay(self) -> np.ndarray:
         """Find λ of the largest evidence, (S,): the best of a coarse grid, then refined between its neighbours."""

@@ -1,17 +1,18 @@
 """Dealing episodes out to folds, and choosing the weight decay λ from moments by fold."""
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from unconstrain.errors import DataError
+from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
 
 N_FOLDS = 5
 N_ALPHAS = 25
-# λ from one that flattens the policy to one at the resolution of H, relative to H's largest eigenvalue.
-SMALLEST, LARGEST = 1e-12, 1e0
+# From one at the resolution of H to one that flattens the policy: pure numbers, relative to H's mean eigenvalue.
+SMALLEST, LARGEST = 1e-11, 1e1
 # Candidates whose held-out risk is within this share of the least cannot be told apart, and the largest is taken:
 # where no sample shows a direction the risk is flat over many decades of λ, and with a small λ slight misfits would
 # determine the parameters there, at many times the size of the policy.
@@ -120,7 +121,9 @@ class EpisodeFolds:
         self.fold_of = dict(zip(labels, state["folds"].tolist(), strict=True))
 
 
-def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndarray, np.ndarray]:
+def choose_alpha(
+    folds: Sequence[Moments], decay_of: Callable[[Moments], Decay]
+) -> tuple[float, np.ndarray, np.ndarray]:
     """Choose the λ with the least risk on folds left out one at a time, or the largest that is as good.
 
     Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
@@ -130,8 +133,8 @@ def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndar
     ----------
     folds : sequence of Moments
         One for each fold.
-    scale : float
-        The largest eigenvalue of all folds' H; the candidates are set relative to it.
+    decay_of : callable
+        Says what the decay acts on where moments are solved; see `Model.decay`.
 
     Returns
     -------
@@ -150,11 +153,11 @@ def choose_alpha(folds: Sequence[Moments], scale: float) -> tuple[float, np.ndar
     folds = [fold for fold in folds if fold.n_samples]
     if len(folds) < 2:
         raise DataError(ONE_FOLD)
-    alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS) * (scale or 1.0)
+    alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS)
     error = np.zeros(N_ALPHAS)
     for i, held_out in enumerate(folds):
         train = Moments.sum(folds[:i] + folds[i + 1 :])
-        candidates = train.decompose().solve(alphas)
+        candidates = decay_of(train).decompose(train).solve(alphas)
         error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
     error /= sum(float(fold.weight.sum()) for fold in folds)
     as_good = error <= (1 + INDISTINGUISHABLE) * error.min()

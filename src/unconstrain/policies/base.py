@@ -83,11 +83,6 @@ class Policy(RegressorMixin, BaseEstimator):
             An option is impossible.
         """
 
-    @property
-    @abstractmethod
-    def placed_by_data(self) -> bool:
-        """Whether `place` depends on where the states lie, and not just on their dimension."""
-
     def fit(
         self,
         X: ArrayLike | Demonstrations,
@@ -121,7 +116,8 @@ class Policy(RegressorMixin, BaseEstimator):
         Raises
         ------
         DataError
-            Arrays are not finite or do not fit together, or nothing moves though the risk needs directions.
+            Arrays are not finite or do not fit together, nothing moves though the risk needs directions, or a known
+            projection does not let its sample's own action through.
         PolicyError
             An option is impossible.
         """
@@ -143,7 +139,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """Learn from more samples; the result is that of one `fit` on all samples so far.
 
         That is exact whatever the pieces when λ is a number and nothing is placed by the data (linear features,
-        centres given). Centres and other data-dependent features are placed by the first piece and kept; with
+        centres and width given). Centres and other data-dependent features are placed by the first piece and kept; with
         `alpha="cv"` give `groups`, whose episodes stay in their fold from piece to piece.
 
         Parameters
@@ -316,7 +312,9 @@ class Policy(RegressorMixin, BaseEstimator):
         PolicyError
             The policy was saved without its sums.
         """
-        return Posterior.of(self.resume().moments(), self.n_actions_ if self.risk == "direct" else 1)
+        moments = self.resume().moments()
+        numbers = self.n_actions_ if self.risk == "direct" else 1
+        return Posterior.of(moments, numbers, self.model_.decay(moments))
 
     def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:
         """Compute how far the true policy may be from `predict`.
@@ -514,7 +512,7 @@ class Policy(RegressorMixin, BaseEstimator):
 
     @property
     def alpha_(self) -> float:
-        """The weight decay λ that was used."""
+        """The weight decay λ that was used, a pure number; see `fitting.decay`."""
         return self.solution_.alpha
 
     @property

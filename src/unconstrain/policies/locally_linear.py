@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.arrays import check_number
+from unconstrain.arrays import check_choice
 from unconstrain.features.base import Features, fit_features
 from unconstrain.features.centers import place_centers
 from unconstrain.features.full import as_features
-from unconstrain.fitting.local_models import LocalModels
+from unconstrain.fitting.local_models import PRIORS, LocalModels
 from unconstrain.fitting.model import Model
 from unconstrain.policies.base import Policy
 
@@ -21,15 +21,17 @@ from unconstrain.policies.base import Policy
 class LocallyLinearPolicy(Policy):
     """The policy `π(x) = Σ_m ω_m(x) B_m (x, 1)`, with `ω_m = K_m / Σ_j K_j` and `K_m(x) = exp(-‖x - c_m‖² / 2σ²)`.
 
-    Each B_m minimises the risk with its samples weighted by K_m, whatever the other models do.
+    Each B_m minimises the risk with its samples weighted by K_m, whatever the other models do. Where those samples are
+    silent, it says what the prior says.
 
     Parameters
     ----------
     features : transformer, Features, or None
         What each local model is made of, as for `ParametricPolicy`; None for the linear features `(x, 1)`.
-    width : float, optional
-        Width σ, in the states' unit. None takes the width at which `n_centers` models reach the coverage, or, for other
-        placements, 1.5 times the centres' mean spacing.
+    width : float or array_like of shape (n,), optional
+        Width σ, in the states' unit: one for all states, or one for each. None takes the width at which `n_centers`
+        models reach the coverage, or, for other placements, 1.5 times the centres' mean spacing, with distances in
+        units of each state's spread.
     centers : {"coverage", "kmeans", "grid"} or array_like of shape (M, n)
         Where the models lie.
     coverage : float
@@ -40,6 +42,8 @@ class LocallyLinearPolicy(Policy):
         As for `ParametricPolicy`.
     alpha : "cv" or float
         As for `ParametricPolicy`; one λ for all models.
+    prior : {"global", "zero"}
+        What each model decays to: the policy of the same features fitted to all data together, or zero, as published.
     random_state : int, optional
         For "kmeans".
 
@@ -47,14 +51,14 @@ class LocallyLinearPolicy(Policy):
     ----------
     centers_ : ndarray of shape (M, n)
         The centres of the receptive fields.
-    width_ : float
-        Their width σ, in the states' unit.
+    width_ : ndarray of shape (n,)
+        Their width σ along each state, in its unit.
     weights_ : ndarray of shape (M, P)
         The parameters of each model.
     coef_ : ndarray of shape (M, d, n)
-        Slopes of linear models; not there for other features.
+        Slopes of linear models, in the states' units; not there for other features.
     intercept_ : ndarray of shape (M, d)
-        Offsets of linear models.
+        Offsets of linear models, at the states' origin.
     alpha_, alphas_, held_out_risk_, n_samples_seen_, n_zero_actions_, n_known_constraints_
         As for `ParametricPolicy`.
     """
@@ -63,12 +67,13 @@ class LocallyLinearPolicy(Policy):
         self,
         features: Any = None,
         *,
-        width: float | None = None,
+        width: Any = None,
         centers: Any = "coverage",
         coverage: float = 0.7,
         n_centers: int = 30,
         risk: str = "inconsistency",
         alpha: float | str = "cv",
+        prior: str = "global",
         random_state: int | None = 0,
     ):
         self.features = features
@@ -78,6 +83,7 @@ class LocallyLinearPolicy(Policy):
         self.n_centers = n_centers
         self.risk = risk
         self.alpha = alpha
+        self.prior = prior
         self.random_state = random_state
 
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
@@ -106,17 +112,18 @@ class LocallyLinearPolicy(Policy):
             X,
             self.centers,
             n_centers=self.n_centers,
-            width=None if self.width is None else check_number(self.width, "width", positive=True),
+            width=self.width,
             coverage=self.coverage,
             sample_weight=sample_weight,
             random_state=self.random_state,
         )
-        return LocalModels(fit_features(as_features(self.features), X, d, sample_weight), centers, width, d)
+        features = fit_features(as_features(self.features), X, d, sample_weight)
+        return LocalModels(features, centers, width, d, self.prior)
 
-    @property
-    def placed_by_data(self) -> bool:
-        """Whether centres, width or features depend on where the states lie."""
-        return self.features is not None or isinstance(self.centers, str) or self.width is None
+    def check_options(self) -> None:
+        """Raise `PolicyError` for a risk, a weight decay or a prior that is none."""
+        super().check_options()
+        check_choice(self.prior, "prior", PRIORS)
 
     @property
     def features_(self) -> Features:
@@ -129,9 +136,9 @@ class LocallyLinearPolicy(Policy):
         return self._places.centers
 
     @property
-    def width_(self) -> float:
-        """The width σ of the receptive fields, in the states' unit."""
-        return self._places.width
+    def width_(self) -> np.ndarray:
+        """The width σ of the receptive fields along each state, in its unit, (n,)."""
+        return np.broadcast_to(self._places.width, self.n_features_in_)
 
     @property
     def weights_(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.features.base import Features, fit_features
+from unconstrain.features.base import Features, LinearInState, fit_features
 from unconstrain.features.full import as_features
 from unconstrain.fitting.global_model import GlobalModel
 from unconstrain.fitting.model import Model
@@ -17,7 +17,7 @@ from unconstrain.policies.base import Policy
 
 
 class ParametricPolicy(Policy):
-    """The unconstrained policy `π(x) = Φ(x) w` behind constrained movements, `w = (H + λI)⁻¹ g`.
+    """The unconstrained policy `π(x) = Φ(x) w` behind constrained movements, `w` of least risk and weight decay.
 
     Parameters
     ----------
@@ -28,13 +28,16 @@ class ParametricPolicy(Policy):
         "inconsistency" learns from each action along its own direction, which no constraint can bend, and from the
         error under the projection where that is known. "direct" is ordinary regression.
     alpha : "cv" or float
-        The weight decay λ of `E(w) + λ‖w‖²`, with E the sum of squared errors over samples; "cv" chooses it by held-out
-        risk among 25 values over five folds of episodes.
+        The weight decay λ, a pure number: relative to what the samples say on the mean of the parameters, whatever the
+        units (`fitting.decay`). Intercepts hardly decay. "cv" chooses it by held-out risk among 25 values over five
+        folds of episodes.
 
     Attributes
     ----------
     weights_ : ndarray of shape (P,)
-        The parameters w.
+        The parameters w of the fitted features; those of linear ones are functions of the standardised state.
+    coef_, intercept_ : ndarray of shape (d, n) and (d,)
+        The linear policy `coef_ @ x + intercept_`, in the states' units; not there for other features.
     features_ : Features
         The fitted feature map.
     alpha_ : float
@@ -87,11 +90,6 @@ class ParametricPolicy(Policy):
         return GlobalModel(features, X.shape[1], d)
 
     @property
-    def placed_by_data(self) -> bool:
-        """Whether features may depend on where the states lie: all but those of the linear policy."""
-        return self.features is not None
-
-    @property
     def weights_(self) -> np.ndarray:
         """The parameters w, (P,)."""
         return self.solution_.w
@@ -100,3 +98,21 @@ class ParametricPolicy(Policy):
     def features_(self) -> Features:
         """The fitted feature map."""
         return self.model_.features
+
+    @property
+    def coef_(self) -> np.ndarray:
+        """The slopes of a linear policy, (d, n), in the states' units."""
+        return self._linear[0]
+
+    @property
+    def intercept_(self) -> np.ndarray:
+        """The action of a linear policy at the states' origin, (d,)."""
+        return self._linear[1]
+
+    @property
+    def _linear(self) -> tuple[np.ndarray, np.ndarray]:
+        features = self.model_.features
+        linear = features.linear(self.solution_.w) if isinstance(features, LinearInState) else None
+        if linear is None:
+            raise AttributeError("coef_ and intercept_ are there only for the linear policy, features=None")
+        return linear

@@ -183,8 +183,7 @@ def begin(
 ) -> Accumulator:
     """Make an accumulator, its model placed on a sample of the source, or going on from the policy's own sums."""
     goes_on = partial and hasattr(policy, "model_")
-    placed_by_data = not goes_on and policy.placed_by_data
-    X, U = source.sample(max(int(sample_rows), 2), random_state) if placed_by_data else source.head()
+    X, U = source.head() if goes_on else source.sample(max(int(sample_rows), 2), random_state)
     derived = U is None
     probe = clone(policy) if not goes_on else deepcopy(policy)
     X, U = check_samples(probe, X, X if U is None else U, reset=not goes_on)

@@ -19,6 +19,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.features.decoupled": ("DecoupledFeatures",),
     "unconstrain.features.potential": ("PotentialFeatures",),
     "unconstrain.features.rbf": ("NormalizedRBF",),
+    "unconstrain.features.scaling": ("Scaling",),
     "unconstrain.fitting.moments": ("Moments",),
     "unconstrain.fitting.solve": ("EpisodeFolds",),
     "unconstrain.fitting.sums": ("Sums",),

@@ -38,19 +38,19 @@ class Centered(CompiledPolicy):
         exp(activations, activations)
         activations.dot(rows, sums)
         if not sums[-1] > UNDERFLOW:
-            activations[:] = normalized_activations(
-                x[None], self.arrays["centers"], float(self.arrays["width"])
-            )[0]
+            activations[:] = normalized_activations(x[None], self.arrays["centers"], self.arrays["width"])[0]
             activations.dot(rows, sums)
         return buffers
 
     def _dimensions(self, arrays: dict[str, ndarray]) -> tuple[int, int]:
         M, n = arrays["centers"].shape
-        width = float(arrays["width"])
-        if not M or not width > 0:
-            raise PolicyError("a compiled policy needs at least one centre, and a width above zero")
-        if not 1e-150 < width < 1e150:
-            raise PolicyError(f"a width of {width:.3g} cannot be squared: state it in another unit")
+        widths = arrays["width"]
+        check_shapes(arrays, width=(n,))
+        if not M or not (widths > 0).all():
+            raise PolicyError("a compiled policy needs at least one centre, and widths above zero")
+        for width in widths.tolist():
+            if not 1e-150 < width < 1e150:
+                raise PolicyError(f"a width of {width:.3g} cannot be squared: state it in another unit")
         return n, self._outputs(arrays, M, n)
 
     @abstractmethod
@@ -60,8 +60,7 @@ class Centered(CompiledPolicy):
     def _prepare(self, arrays: dict[str, ndarray]) -> tuple[Any, ...]:
         rows = self._rows(arrays)
         rows = np.column_stack([rows, np.ones(len(rows))])
-        n = arrays["centers"].shape[1]
-        scale = np.full(n, -0.5 / arrays["width"] ** 2)
+        scale = -0.5 / arrays["width"] ** 2
         return np.ascontiguousarray(arrays["centers"].T), scale, np.ascontiguousarray(rows)
 
     @abstractmethod
@@ -73,7 +72,7 @@ class Centered(CompiledPolicy):
         return np.empty_like(columns), np.empty(rows.shape[1]), np.empty(len(rows))
 
     def _blend(self, X: ndarray) -> ndarray:
-        return normalized_activations(X, self.arrays["centers"], float(self.arrays["width"]))
+        return normalized_activations(X, self.arrays["centers"], self.arrays["width"])
 
     def _typical_states(self, rng: np.random.Generator, count: int) -> ndarray:
         centers, width = self.arrays["centers"], self.arrays["width"]
@@ -88,18 +87,18 @@ class RadialBasis(Centered):
     ----------
     centers : array_like of shape (M, n)
         c_i.
-    width : float
-        σ, in the states' unit.
+    width : float or array_like of shape (n,)
+        σ along each dimension, in its unit.
     weights : array_like of shape (d, M)
         W.
     """
 
     __slots__ = ()
     kind = "rbf"
-    layout: ClassVar = {"centers": 2, "width": 0, "weights": 2}
+    layout: ClassVar = {"centers": 2, "width": 1, "weights": 2}
 
     def __init__(self, centers: ArrayLike, width: ArrayLike, weights: ArrayLike) -> None:
-        super().__init__(centers=centers, width=width, weights=weights)
+        super().__init__(centers=centers, width=_widths(width, centers), weights=weights)
 
     def __call__(self, x: ArrayLike, out: ndarray | None = None) -> ndarray:
         """Act; see `CompiledPolicy`."""
@@ -149,8 +148,8 @@ class LocallyLinear(Centered):
     ----------
     centers : array_like of shape (M, n)
         c_i.
-    width : float
-        σ, in the states' unit.
+    width : float or array_like of shape (n,)
+        σ along each dimension, in its unit.
     coef : array_like of shape (M, d, n)
         B_m.
     intercept : array_like of shape (M, d)
@@ -159,10 +158,10 @@ class LocallyLinear(Centered):
 
     __slots__ = ()
     kind = "local"
-    layout: ClassVar = {"centers": 2, "width": 0, "coef": 3, "intercept": 2}
+    layout: ClassVar = {"centers": 2, "width": 1, "coef": 3, "intercept": 2}
 
     def __init__(self, centers: ArrayLike, width: ArrayLike, coef: ArrayLike, intercept: ArrayLike) -> None:
-        super().__init__(centers=centers, width=width, coef=coef, intercept=intercept)
+        super().__init__(centers=centers, width=_widths(width, centers), coef=coef, intercept=intercept)
 
     def __call__(self, x: ArrayLike, out: ndarray | None = None) -> ndarray:
         """Act; see `CompiledPolicy`."""
@@ -226,18 +225,18 @@ class Potential(Centered):
     ----------
     centers : array_like of shape (M, n)
         c_i.
-    width : float
-        σ, in the states' unit.
+    width : float or array_like of shape (n,)
+        σ along each dimension, in its unit.
     weights : array_like of shape (M,)
         w.
     """
 
     __slots__ = ()
     kind = "potential"
-    layout: ClassVar = {"centers": 2, "width": 0, "weights": 1}
+    layout: ClassVar = {"centers": 2, "width": 1, "weights": 1}
 
     def __init__(self, centers: ArrayLike, width: ArrayLike, weights: ArrayLike) -> None:
-        super().__init__(centers=centers, width=width, weights=weights)
+        super().__init__(centers=centers, width=_widths(width, centers), weights=weights)
 
     def __call__(self, x: ArrayLike, out: ndarray | None = None) -> ndarray:
         """Act; see `CompiledPolicy`."""
@@ -248,21 +247,22 @@ class Potential(Centered):
         try:
             out = multiply(centre, sums[-2] / total, out)
             subtract(out, pulls, out)
-            return multiply(out, rate / total, out)
+            multiply(out, rate, out)
+            return divide(out, total, out)
         except (ValueError, TypeError) as error:
             raise self._bad_out(out) from error
 
     def magnitude(self, X: ndarray) -> float:
         """Return the largest term that is added up; see `CompiledPolicy`."""
         away = self.arrays["centers"] - self.arrays["centers"].mean(axis=0)
-        return float(np.abs(self.arrays["weights"]).max() * np.abs(away).max() / self.arrays["width"] ** 2)
+        return float(np.abs(self.arrays["weights"]).max() * np.abs(away / self.arrays["width"] ** 2).max())
 
     def _outputs(self, arrays: dict[str, ndarray], M: int, n: int) -> int:
         check_shapes(arrays, weights=(M,))
         return n
 
     def _prepare(self, arrays: dict[str, ndarray]) -> tuple[Any, ...]:
-        return (*super()._prepare(arrays), 1.0 / float(arrays["width"]) ** 2)
+        return (*super()._prepare(arrays), 1.0 / arrays["width"] ** 2)
 
     def _rows(self, arrays: dict[str, ndarray]) -> ndarray:
         away, weights = arrays["centers"] - arrays["centers"].mean(axis=0), arrays["weights"][:, None]
@@ -277,3 +277,8 @@ class Potential(Centered):
         sums = self._blend(X) @ self._parts[2]
         n = self.n_states
         return (sums[:, -2, None] * sums[:, n : 2 * n] - sums[:, :n]) * self._parts[3]
+
+
+def _widths(width: ArrayLike, centers: ArrayLike) -> ArrayLike:
+    """Give each dimension the one width of all, where it is one."""
+    return np.full(np.shape(centers)[-1:], width) if np.ndim(width) == 0 else width

@@ -4,6 +4,8 @@ Each model sums the same samples, weighted by its own receptive field. Where fea
 the same distinct products differently, so all of them together are one matrix product.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from unconstrain.features.base import Features, FullBasis
@@ -29,10 +31,12 @@ NEGLIGIBLE = np.finfo(np.float64).eps ** 2
 def moments(
     features: Features,
     centers: np.ndarray,
-    width: float,
+    width: float | np.ndarray,
     X: np.ndarray,
     observation: Observation,
     weights: np.ndarray | None = None,
+    *,
+    everywhere: bool = False,
 ) -> Moments:
     """Sum the moments of local models, each weighted by `exp(-‖x - c_m‖² / 2σ²)`.
 
@@ -42,7 +46,7 @@ def moments(
         Fitted; the same for every model.
     centers : ndarray of shape (M, n)
         The models' centres.
-    width : float
+    width : float or ndarray of shape (n,)
         Width σ, in the states' unit.
     X : ndarray of shape (N, n)
         States.
@@ -50,26 +54,56 @@ def moments(
         Of N samples.
     weights : ndarray of shape (N,), optional
         Weight of each sample, 1 by default.
+    everywhere : bool
+        Sum one more model, that every sample reaches in full.
 
     Returns
     -------
     Moments
-        Stacked along a leading axis of M models.
+        Stacked along a leading axis of M models; with those of the one more as `everywhere`.
     """
+    fields = _Fields(centers, width, everywhere)
     if isinstance(features, FullBasis):
-        return _of_products(features, centers, width, X, observation, weights)
-    return _of_rows(features, centers, width, X, observation, weights)
+        found = _of_products(features, fields, X, observation, weights)
+    else:
+        found = _of_rows(features, fields, X, observation, weights)
+    if not everywhere:
+        return found
+    H, g, squares, weight = (part[:-1] for part in (found.H, found.g, found.squares, found.weight))
+    whole = Moments(found.H[-1], found.g[-1], found.squares[-1], found.weight[-1], len(X))
+    return Moments(H, g, squares, weight, len(X), whole)
+
+
+@dataclass(frozen=True)
+class _Fields:
+    """The receptive fields of M models, the last of which reaches everywhere if asked."""
+
+    centers: np.ndarray
+    width: float | np.ndarray
+    everywhere: bool
+
+    def __len__(self) -> int:
+        return len(self.centers) + self.everywhere
+
+    def reach(self, X: np.ndarray, weights: np.ndarray | None, block: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the weight (N, M) of each sample in each model, and which models (M,) the block reaches."""
+        receptive = activations(X, self.centers, self.width)
+        if self.everywhere:
+            receptive = np.column_stack([receptive, np.ones(len(X))])
+        near = receptive.max(axis=0) > NEGLIGIBLE
+        if weights is not None:
+            receptive *= weights[block, None]
+        return receptive, near
 
 
 def _of_products(
     features: FullBasis,
-    centers: np.ndarray,
-    width: float,
+    fields: _Fields,
     X: np.ndarray,
     observation: Observation,
     weights: np.ndarray | None,
 ) -> Moments:
-    M, k, d = len(centers), features.basis(X[:1]).shape[1], observation.n_actions
+    M, k, d = len(fields), features.basis(X[:1]).shape[1], observation.n_actions
     pairs_b, pairs_q = n_pairs(k), (1 if observation.whole else n_pairs(d))
     n_products, n_pulls = pairs_b * pairs_q, d * k
     # All that is summed, a row each: the distinct entries of H, then g, s and the weight itself.
@@ -78,7 +112,7 @@ def _of_products(
 
     def add(block: slice, totals: Totals) -> None:
         B, part = features.basis(X[block]), observation[block]
-        receptive, near = _receptive(X[block], centers, width, weights, block)
+        receptive, near = fields.reach(X[block], weights, block)
         (total,) = totals
         summed = working_space("summed", n_summed, size)[:, : len(B)]
         products = summed[:n_products].reshape(pairs_b, pairs_q, -1)
@@ -106,19 +140,18 @@ def _of_products(
 
 def _of_rows(
     features: Features,
-    centers: np.ndarray,
-    width: float,
+    fields: _Fields,
     X: np.ndarray,
     observation: Observation,
     weights: np.ndarray | None,
 ) -> Moments:
-    M, d = len(centers), observation.n_actions
+    M, d = len(fields), observation.n_actions
     P = features.along(X[:1].astype(np.float64, copy=False), np.ones((1, d))).shape[1]
 
     def add(block: slice, totals: Totals) -> None:
         part, states = observation[block], X[block].astype(np.float64, copy=False)
         rows, targets, each = np.ascontiguousarray(part.rows), part.targets, part.row_weights
-        receptive, near = _receptive(states, centers, width, weights, block)
+        receptive, near = fields.reach(states, weights, block)
         H, g, squares, weight = totals
         for k in range(part.n_rows):
             V = features.along(states, rows[:, k])
@@ -136,14 +169,3 @@ def _of_rows(
     size = rows_in_block(PRODUCTS_IN_BLOCK, P)
     H, g, squares, weight = sum_over_blocks(len(X), size, [(M, P, P), (M, P, 1), (M,), (M,)], add)
     return Moments(H, g, squares, weight, len(X))
-
-
-def _receptive(
-    X: np.ndarray, centers: np.ndarray, width: float, weights: np.ndarray | None, block: slice
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the weight (N, M) of each sample in each model, and which models (M,) the block reaches."""
-    receptive = activations(X, centers, width)
-    near = receptive.max(axis=0) > NEGLIGIBLE
-    if weights is not None:
-        receptive *= weights[block, None]
-    return receptive, near

@@ -5,34 +5,42 @@ a sample was free, and with it what the sample says: an expansion of its expecte
 prediction p,
 
     ℓ(p') ≈ ℓ(p) + gᵀ(p' - p) - (p' - p)ᵀ A (p' - p) / 2,
-    g = γ ∇log p(u | free) + (1 - γ) ∇log p(u | constrained),
+    g = γ ∇log p(u | free) + (1 - γ) ∇log p(ρ | constrained),
     A = γ S⁻¹ + (1 - γ) (n nᵀ + ε I) / s²,
 
 with the exact gradients, and informations in place of curvatures: n is the gradient of the distance to the sphere.
-So a fit is again a sum of moments, `H = Σ Φᵀ A Φ` and `Σ Φᵀ (A p + g)`, and repeating it climbs the likelihood of the
-recordings (expectation maximisation, each maximisation one step of Fisher scoring).
+So a fit is again a sum of moments, `H = Σ Φᵀ A Φ` and `Σ Φᵀ (A p + g)`, and repeating it is expectation
+maximisation, each maximisation one step of Fisher scoring.
+
+Residuals of a model that does not quite fit change slowly along an episode, and a hundred samples then tell no more than
+one. So log-likelihoods count as much as there are independent samples, `(1 - φ) / (1 + φ)` of them for residuals of
+correlation φ from one sample to the next.
 
 References
 ----------
 Dempster, Laird, Rubin, Maximum likelihood from incomplete data via the EM algorithm, J. R. Stat. Soc. B 39, 1977.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.fitting.chain import Chain, Counts, smooth
+from unconstrain.fitting.drift import Drift, Drifts, Steps
+from unconstrain.fitting.likelihood import Views
 from unconstrain.fitting.model import Model
-from unconstrain.fitting.noise import Noise, Squares, Views
+from unconstrain.fitting.noise import Noise, Squares
 from unconstrain.fitting.observation import Expanded, unknown
 from unconstrain.samples import Samples
 
 Floats = NDArray[np.float64]
 
-# What the log-likelihood of a state that is known not to hold is.
 IMPOSSIBLE = -1e9
+"""The log-likelihood of a state that is known not to hold."""
+
+MOST_CORRELATED = 0.999
 
 
 @dataclass(frozen=True)
@@ -46,31 +54,69 @@ class Belief:
     noise : Noise
         Variances.
     chain : Chain
-        Probabilities of being free; a free share of 1 or 0 takes all samples as free or as constrained.
+        Probabilities of being free.
+    drift : Drift, optional
+        How constrained samples follow each other on the sphere; without one each may be anywhere.
+    evidence : float
+        How many independent samples a sample is worth, at most 1.
+    held : {"free", "constrained"}, optional
+        What all samples are taken for that are not known to be otherwise.
     """
 
     w: Floats
     noise: Noise
-    chain: Chain
-    drift: "Drift" = None
-    share: float = 1.0
+    chain: Chain = field(default_factory=Chain)
+    drift: Drift | None = None
+    evidence: float = 1.0
+    held: str | None = None
 
 
 @dataclass(frozen=True)
-class Drift:
-    square: float = 0.01
-    jump: float = 0.5
+class Tally:
+    """What a pass over samples adds up besides moments. Tallies add.
 
-@dataclass(frozen=True)
-class DriftSums:
-    pairs: float
-    near: float
-    square: float
-    weight: float
-    def __add__(self,o): return DriftSums(self.pairs+o.pairs,self.near+o.near,self.square+o.square,self.weight+o.weight)
-    def estimate(self):
-        sq=(self.square)/(self.weight+1e-300)
-        return Drift(float(np.clip(sq,1e-8,1.)), float((self.pairs-self.near+1)/(self.pairs+2)))
+    Parameters
+    ----------
+    log_likelihood : float
+        Of all samples.
+    counts : Counts
+        Of hidden states.
+    squares : Squares
+        Of residuals.
+    drifts : Drifts
+        Of constrained samples that follow each other.
+    echo : float
+        `Σ e_t · e_{t-1}` of residuals in units of their deviation, and
+    energy : float
+        `Σ (e_t² + e_{t-1}²) / 2`.
+    n_samples : int
+        How many.
+    """
+
+    log_likelihood: float
+    counts: Counts
+    squares: Squares
+    drifts: Drifts
+    echo: float
+    energy: float
+    n_samples: int
+
+    def __add__(self, other: "Tally") -> "Tally":
+        return Tally(
+            self.log_likelihood + other.log_likelihood,
+            self.counts + other.counts,
+            self.squares + other.squares,
+            self.drifts + other.drifts,
+            self.echo + other.echo,
+            self.energy + other.energy,
+            self.n_samples + other.n_samples,
+        )
+
+    @property
+    def evidence(self) -> float:
+        """How many independent samples a sample is worth."""
+        correlation = np.clip(self.echo / self.energy, 0.0, MOST_CORRELATED) if self.energy > 0 else 0.0
+        return float((1 - correlation) / (1 + correlation))
 
 
 class Found(NamedTuple):
@@ -78,29 +124,87 @@ class Found(NamedTuple):
 
     Parameters
     ----------
-    observation : Expanded
-        What they say of the policy.
+    views : Views
+        The samples as seen from the predictions.
     free : ndarray of shape (N,)
         Probability that each was free.
-    log_likelihood : ndarray of shape (N,)
-        Of each sample, given those before it in its episode.
-    counts : Counts
-        Of hidden states.
-    squares : Squares
-        Of residuals.
+    taken_whole : ndarray of shape (N,)
+        The same, but 1 where the projection is known: behind it a sample is seen whole.
+    known : ndarray of shape (N,), bool
+        Where the projection is known.
+    projections : ndarray of shape (K, d, d)
+        The projections of these.
+    tally : Tally
+        What the samples add up to.
     """
 
-    observation: Expanded
+    views: Views
     free: Floats
-    log_likelihood: Floats
-    counts: Counts
-    squares: Squares
-    drifts: DriftSums | None = None
-    auto: Floats | None = None
+    taken_whole: Floats
+    known: NDArray[np.bool_]
+    projections: Floats
+    tally: Tally
+
+    def expand(self) -> Expanded:
+        """Expand expected log-likelihoods about the predictions, in units of what a free sample says.
+
+        Returns
+        -------
+        Expanded
+            Of N samples.
+        """
+        views, free = self.views, self.taken_whole
+        unit, whole, bent, sphere = views.noise.across, views.whole, views.constrained, views.sphere
+        not_free = 1 - free
+        along = free * (unit * whole.information - 1)
+        towards = not_free * unit / bent.variance
+        # Where noise is as large as the sphere, an action tells something in every direction.
+        blunt = towards * 0.25 * bent.variance / (bent.variance + sphere.radius**2)
+        gradient = unit * (free[:, None] * whole.gradient + not_free[:, None] * bent.gradient)
+        error = free * (whole.across + unit / whole.variance * whole.along) + towards * bent.square
+        parts = (free + blunt, along, towards, sphere.ahead, sphere.normal)
+        return Expanded.of(
+            views.P, gradient, error, *parts, known=self.known, projections=self.projections
+        )
+
+    def judge(self, scale: float) -> Expanded:
+        """Make the observation by which parameters are judged that were not learnt from these samples.
+
+        It does not weigh samples by what is predicted, as likelihoods do, so that no prediction can make itself matter
+        less; and it is corrected for noise, so that its expectation is least at the true policy:
+        `γ ‖u - p‖² + (1 - γ) (uᵀ(u - p))² / scale`, less what noise adds to the latter that hangs on p.
+
+        Parameters
+        ----------
+        scale : float
+            Mean squared length of the actions.
+
+        Returns
+        -------
+        Expanded
+            Of N samples.
+
+        References
+        ----------
+        Kukush, Markovsky, Van Huffel, Consistent estimation in an implicit quadratic measurement error model,
+        Computational Statistics and Data Analysis 47, 2004.
+        """
+        U, free = self.views.U, self.taken_whole
+        d, v = U.shape[1], self.views.noise.across
+        y = np.einsum("nd,nd->n", U, U)
+        bent = (1 - free) / scale
+        pulls = (free + bent * (y - (d + 2) * v))[:, None] * U
+        squares = free * y + bent * (y**2 - (2 * d + 4) * v * y + d * (d + 2) * v**2)
+        # What noise adds to either whatever the policy is, so that small differences are seen beside it.
+        squares = squares + bent * v * y
+        zero = np.zeros_like(free)
+        return Expanded(
+            free - bent * v, zero, bent, np.zeros_like(U), U, pulls, squares, self.known, self.projections
+        )
 
 
 def infer(model: Model, belief: Belief, samples: Samples) -> Found:
-    """Infer which samples were free, and what they say of the policy.
+    """Infer which samples were free.
 
     Parameters
     ----------
@@ -128,46 +232,35 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
         P[known] = np.einsum("nij,nj->ni", rows, P[known])
         ranks[known] = np.einsum("nii->n", rows)
     views = Views(U, P, belief.noise, ranks)
-    log_free, log_bent = views.whole.log, views.bent.log
-    if known.any():
-        log_free, log_bent = log_free.copy(), log_bent.copy()
+    log_free, log_bent = views.whole.log.copy(), views.constrained.log.copy()
+    if belief.held is not None:
+        (log_bent if belief.held == "free" else log_free)[~known] = IMPOSSIBLE
+    if len(rows):
         is_free = ranks[known] > d - 0.5
         log_bent[known] = np.where(is_free, IMPOSSIBLE, log_free[known])
         log_free[known] = np.where(is_free, log_free[known], IMPOSSIBLE)
     starts = episode_starts(samples)
-    log_kept = None
-    drifts = None
-    if belief.drift is not None and not starts.all():
-        from unconstrain.fitting.sphere import scaled_bessel
-        out, R2 = views.sphere.out, np.maximum(views.sphere.radius**2, 1e-300)
-        chord = np.zeros(N)
-        chord[1:] = ((out[1:] - out[:-1]) ** 2).sum(axis=1)
-        blur = views.bent.variance / R2
-        own = np.zeros(N); own[1:] = 1.5 * (blur[1:] + blur[:-1])
-        kappa = 1 / (belief.drift.square + own)
-        log_mean, _ = scaled_bessel(d, kappa)
-        near = np.log1p(-belief.drift.jump + 1e-12) - kappa * chord / 2 - log_mean
-        far = np.log(belief.drift.jump + 1e-12)
-        log_kept = np.logaddexp(near, far)
-    T = belief.share
-    free, log_likelihood, counts, kept = smooth(log_free * T, log_bent * T, starts, belief.chain, None if log_kept is None else log_kept * T)
-    ef = (views.U - views.P) / np.sqrt(belief.noise.across)
-    eb = views.sphere.distance / np.sqrt(views.bent.variance)
-    both = np.zeros(N); both[1:] = free[1:] * free[:-1] * ~starts[1:]
-    neither = np.zeros(N); neither[1:] = (1 - free[1:]) * (1 - free[:-1]) * ~starts[1:]
-    sf = (ef**2).sum(1); 
-    cf = np.zeros(N); cf[1:] = (ef[1:] * ef[:-1]).sum(1); mf = np.zeros(N); mf[1:] = (sf[1:] + sf[:-1]) / 2
-    cb = np.zeros(N); cb[1:] = eb[1:] * eb[:-1]; mb = np.zeros(N); mb[1:] = (eb[1:]**2 + eb[:-1]**2) / 2
-    auto = np.array([(both * cf + neither * cb).sum(), (both * mf + neither * mb).sum()])
-    if log_kept is not None:
-        resp = kept * np.exp(near - log_kept)
-        e2 = chord / max(d - 1, 1)
-        drifts = DriftSums(float(kept.sum()), float(resp.sum()), float((resp * (e2 - own) * kappa**2).sum()), float((resp * kappa**2).sum()))
-    # A sample whose projection is known is seen whole behind it.
+    steps = None
+    if belief.drift is not None and d > 1 and not starts.all():
+        steps = Steps.of(views.sphere, views.constrained.variance, starts, belief.drift)
+    free, log_likelihood, counts, kept = smooth(
+        belief.evidence * log_free,
+        belief.evidence * log_bent,
+        starts,
+        belief.chain,
+        None if steps is None else belief.evidence * steps.log_kept,
+    )
     taken = np.where(known, 1.0, free)
-    observation = _expand(views, taken, known, rows)
-    squares = _squares(views, taken, samples.weights)
-    return Found(observation, free, log_likelihood, counts, squares, drifts, auto)
+    omega = np.ones(N) if samples.weights is None else samples.weights
+    tally = Tally(
+        float(omega @ log_likelihood),
+        counts,
+        _squares(views, taken, omega),
+        Drifts() if steps is None else steps.sum(kept),
+        *_echo(views, taken, starts),
+        N,
+    )
+    return Found(views, free, taken, known, rows, tally)
 
 
 def episode_starts(samples: Samples) -> NDArray[np.bool_]:
@@ -190,51 +283,35 @@ def episode_starts(samples: Samples) -> NDArray[np.bool_]:
     return starts
 
 
-def _expand(views: Views, free: Floats, known: NDArray[np.bool_], rows: Floats) -> Expanded:
-    """Expand expected log-likelihoods about predictions, in units of what a free sample says."""
-    unit, whole, bent, sphere = views.noise.across, views.whole, views.bent, views.sphere
-    not_free = 1 - free
-    along = free * (unit * whole.information - 1)
-    towards = not_free * unit / bent.variance
-    # The sphere is curved: where noise is as large as its radius, an action tells something in every direction.
-    blunt = towards * 0.25 * bent.variance / (bent.variance + sphere.radius**2)
-    gradient = unit * (free[:, None] * whole.gradient + not_free[:, None] * bent.gradient)
-    error = free * (whole.across + unit / whole.variance * whole.along) + towards * bent.square
-    parts = (free + blunt, along, towards, sphere.ahead, sphere.normal)
-    return Expanded.of(views.P, gradient, error, *parts, known=known, projections=rows)
-
-
-def judge(U: Floats, free: Floats, noise: Noise, scale: float, known: NDArray[np.bool_], rows: Floats) -> Expanded:
-    """Risk of any policy, unbiased by noise."""
-    d = U.shape[1]
-    y = np.einsum("nd,nd->n", U, U)
-    bent = (1 - free) / scale
-    v = noise.across
-    pulls = (free + bent * (y - (d + 2) * v))[:, None] * U
-    squares = free * y + bent * (y**2 - (2 * d + 4) * v * y + d * (d + 2) * v**2)
-    zero = np.zeros_like(free)
-    return Expanded(free - bent * v, zero, bent, np.zeros_like(U), U, pulls, squares, known, rows)
-
-
-def _squares(views: Views, free: Floats, weights: Floats | None) -> Squares:
+def _squares(views: Views, free: Floats, omega: Floats) -> Squares:
     """Sum up what squared residuals say of the variances."""
-    noise, whole, bent = views.noise, views.whole, views.bent
-    omega = np.ones_like(free) if weights is None else weights
+    noise, whole, bent = views.noise, views.whole, views.constrained
     taken, bends = omega * free, omega * (1 - free)
-    ranks = np.maximum(views.ranks - 1, 0)
-    one = np.ones_like(free)
+    one, zero = np.ones_like(free), np.zeros_like(free)
     r2 = np.einsum("nd,nd->n", views.U, views.U)
     share = views.sphere.share
     parts = [
-        (taken * ranks, taken * whole.across, np.full_like(one, noise.across), (one, 0 * one, one)),
-        (taken * (views.ranks > 0), taken * whole.along, whole.variance, (one, whole.length**2, one)),
+        (
+            taken * np.maximum(views.ranks - 1, 0),
+            taken * whole.across,
+            np.full_like(one, noise.across),
+            (one, zero, one),
+        ),
+        (taken * (views.ranks > 0.5), taken * whole.along, whole.variance, (one, whole.length**2, one)),
         (bends, bends * bent.square, bent.variance, (one, share * r2, share)),
     ]
-    matrix, vector, total, count = np.zeros((3, 3)), np.zeros(3), 0.0, 0.0
-    for number, square, variance, contributions in parts:
-        c = np.stack(contributions) / variance
-        matrix += (c * number) @ c.T
-        vector += c @ (square / variance)
-        total += float(np.sum(square / variance))
-        count += float(np.sum(number))
-    return Squares(matrix, vector, total, count)
+    return Squares.sum(parts)
+
+
+def _echo(views: Views, free: Floats, starts: NDArray[np.bool_]) -> tuple[float, float]:
+    """Sum up how residuals agree with those before them, and their squares."""
+    follows = ~starts[1:]
+    both, neither = free[1:] * free[:-1] * follows, (1 - free[1:]) * (1 - free[:-1]) * follows
+    as_free = (views.U - views.P) / np.sqrt(views.noise.across)
+    as_bent = (views.sphere.distance / np.sqrt(views.constrained.variance))[:, None]
+    echo = energy = 0.0
+    for weight, e in ((both, as_free), (neither, as_bent)):
+        square = np.einsum("nd,nd->n", e, e)
+        echo += float(weight @ np.einsum("nd,nd->n", e[1:], e[:-1]))
+        energy += float(weight @ (square[1:] + square[:-1])) / 2
+    return echo, energy

@@ -5,12 +5,14 @@ time in threads. A cluster gives each worker an empty copy, and merges what come
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
+from unconstrain.fitting.contact import Belief, Tally, infer
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation, informative, observe, unknown
@@ -47,6 +49,12 @@ class Solution:
         The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
     n_samples, n_zero, n_known : int
         How many samples were added, how many of them do not move, and of how many the projection is known.
+    belief : Belief, optional
+        What was inferred of contact and noise, with these parameters.
+    free_share : float
+        Share of samples that were free, as inferred.
+    record : Record
+        How that was found.
     """
 
     w: np.ndarray
@@ -56,6 +64,25 @@ class Solution:
     n_samples: int = 0
     n_zero: int = 0
     n_known: int = 0
+    belief: Belief | None = None
+    free_share: float = math.nan
+    record: "Record" = field(default_factory=lambda: Record())
+
+
+@dataclass(frozen=True)
+class Record:
+    """How contact was inferred.
+
+    Parameters
+    ----------
+    log_likelihoods : dict of str to float
+        Held-out log-likelihood of a sample, by what was assumed; the first is what was chosen.
+    history : tuple of dict
+        One for each pass: what was assumed, log-likelihood, noise, and share of free samples.
+    """
+
+    log_likelihoods: dict[str, float] = field(default_factory=dict)
+    history: tuple[dict[str, Any], ...] = ()
 
 
 class Accumulator:
@@ -65,14 +92,20 @@ class Accumulator:
     ----------
     model : Model
         What samples are summed under.
-    risk : {"inconsistency", "direct"}
-        What a sample says of the policy.
+    risk : {"adaptive", "inconsistency", "direct", "whole"}
+        What a sample says of the policy; "whole" is direct where nothing is known of the projection.
     alpha : float or "cv"
         The weight decay λ; "cv" chooses it by held-out risk, which keeps the sums of each fold apart.
     longest : float
         Length of the longest action known beforehand, beside which others have no motion.
     folds : EpisodeFolds, optional
         Folds to go on dealing to.
+    belief : Belief, optional
+        For "adaptive": what is inferred from.
+    scale : float
+        For "adaptive": mean squared length of the actions, in squared units of the action.
+    record : Record
+        For "adaptive": how the belief was found.
 
     Attributes
     ----------
@@ -80,6 +113,11 @@ class Accumulator:
         None where λ is a number.
     total : Sums
         What was added so far.
+    is_judged : bool
+        For "adaptive": whether the sums that λ is chosen by are kept too.
+    compared : tuple of tuple of Belief
+        For "adaptive": beliefs whose likelihood is summed up, instead of moments; each one for all samples, or one for
+        each fold.
     """
 
     def __init__(
@@ -89,12 +127,20 @@ class Accumulator:
         alpha: float | str = "cv",
         longest: float = 0.0,
         folds: EpisodeFolds | None = None,
+        belief: Belief | None = None,
+        scale: float = 1.0,
+        record: Record | None = None,
     ):
         self.model = model
         self.risk = risk
         self.alpha = alpha
         self.longest = longest
         self.folds = (folds or EpisodeFolds()) if alpha == "cv" else None
+        self.belief = belief
+        self.scale = scale
+        self.record = record or Record()
+        self.is_judged = alpha == "cv"
+        self.compared: tuple[tuple[Belief, ...], ...] = ()
         self.total = Sums()
 
     def add(self, samples: Samples) -> None:
@@ -158,20 +204,27 @@ class Accumulator:
         if samples.projections is not None:
             check_lets_through(samples.projections, U)
         counted = find_informative_samples(self.risk, samples, moves)
-        observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
-        moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
-        for k in [0] if fold is None else np.unique(fold[counted]).tolist():
-            rows = counted if fold is None else counted & (fold == k)
-            if rows.any():
-                moments[k] = self._moments(samples, observation, rows)
-        return Sums(
-            tuple(moments),
+        counts = Sums(
             n_samples=len(U),
             n_zero=len(U) - int(np.count_nonzero(moves)),
             n_known=0 if samples.projections is None else int(np.sum(~unknown(samples.projections))),
             longest=longest,
-            shortest=float(r.min(initial=math.inf, where=moves)),
         )
+        if self.compared:
+            return replace(
+                counts, tallies=tuple(self._compare(each, samples, fold) for each in self.compared)
+            )
+        if self.risk != "adaptive":
+            observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
+            moments = self._by_fold(samples, observation, counted, fold)
+            return replace(counts, moments=moments, shortest=float(r.min(initial=math.inf, where=moves)))
+        assert self.belief is not None
+        found = infer(self.model, self.belief, samples)
+        moments = self._by_fold(samples, found.expand(), counted, fold)
+        judges: tuple[Moments | None, ...] = ()
+        if self.is_judged:
+            judges = self._by_fold(samples, found.judge(self.scale), counted, fold)
+        return replace(counts, moments=moments, judges=judges, tallies=(found.tally,))
 
     def include(self, sums: Sums) -> None:
         """Add sums to those there are.
@@ -213,9 +266,18 @@ class Accumulator:
             Empty.
         """
         folds = None if self.folds is None else EpisodeFolds(self.folds.n_folds, known_folds)
-        return Accumulator(
-            self.model, self.risk, self.alpha, self.longest if longest is None else longest, folds
+        other = Accumulator(
+            self.model,
+            self.risk,
+            self.alpha,
+            self.longest if longest is None else longest,
+            folds,
+            self.belief,
+            self.scale,
+            self.record,
         )
+        other.is_judged, other.compared = self.is_judged, self.compared
+        return other
 
     def copy(self) -> "Accumulator":
         """Copy the accumulator; the copies share their sums, which never change themselves.
@@ -225,8 +287,8 @@ class Accumulator:
         Accumulator
             With the same sums.
         """
-        folds = None if self.folds is None else self.folds.copy()
-        other = Accumulator(self.model, self.risk, self.alpha, self.longest, folds)
+        other = self.empty()
+        other.folds = None if self.folds is None else self.folds.copy()
         other.total = self.total
         return other
 
@@ -291,7 +353,8 @@ class Accumulator:
         decay = self.model.decay(total)
         if alpha != "cv":
             return self._solution(decay.solve(total, float(alpha)), float(alpha))
-        chosen, alphas, risk = choose_alpha(folds, self.model.decay)
+        judges = [part for k, part in enumerate(self.total.judges) if part is not None and k != without]
+        chosen, alphas, risk = choose_alpha(folds, self.model.decay, judges or None)
         return self._solution(decay.solve(total, chosen), chosen, alphas, risk)
 
     def _solution(
@@ -301,9 +364,18 @@ class Accumulator:
         alphas: np.ndarray | None = None,
         held_out_risk: np.ndarray | None = None,
     ) -> Solution:
-        total = self.total
+        total, parameters = self.total, self.model.parameters(w)
         counts = (total.n_samples, total.n_zero, total.n_known)
-        return Solution(self.model.parameters(w), alpha, alphas, held_out_risk, *counts)
+        solution = Solution(parameters, alpha, alphas, held_out_risk, *counts)
+        if self.belief is None:
+            return solution
+        states = total.tallies[0].counts.states
+        return replace(
+            solution,
+            belief=replace(self.belief, w=parameters),
+            free_share=float(states[0] / states.sum()),
+            record=self.record,
+        )
 
     def _folds(self, without: int | None) -> list[Moments]:
         folds = [part for k, part in enumerate(self.total.moments) if part is not None and k != without]
@@ -316,6 +388,30 @@ class Accumulator:
         raise DataError(
             "all motion lies in one fold, so none is left without it: give more episodes, or no groups"
         )
+
+    def _by_fold(
+        self, samples: Samples, observation: Observation, counted: np.ndarray, fold: np.ndarray | None
+    ) -> tuple[Moments | None, ...]:
+        moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
+        for k in [0] if fold is None else np.unique(fold[counted]).tolist():
+            rows = counted if fold is None else counted & (fold == k)
+            if rows.any():
+                moments[k] = self._moments(samples, observation, rows)
+        return tuple(moments)
+
+    def _compare(self, beliefs: tuple[Belief, ...], samples: Samples, fold: np.ndarray | None) -> Tally:
+        """Sum up the likelihood of samples under beliefs: one for all, or one for each fold."""
+        if fold is None or len(beliefs) == 1:
+            return infer(self.model, beliefs[0], samples).tally
+        tallies = []
+        for k in np.unique(fold).tolist():
+            rows = fold == k
+            part = Samples(*(None if each is None else each[rows] for each in samples))
+            tallies.append(infer(self.model, beliefs[k], part).tally)
+        total = tallies[0]
+        for tally in tallies[1:]:
+            total = total + tally
+        return total
 
     def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Moments:
         X, weights = samples.states, samples.weights
@@ -332,8 +428,9 @@ def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> 
 
     Parameters
     ----------
-    risk : {"inconsistency", "direct"}
-        Under the first, a sample that does not move says something only where its projection is known and not zero.
+    risk : {"adaptive", "inconsistency", "direct", "whole"}
+        Under the inconsistency, a sample that does not move says something only where its projection is known and not
+        zero.
     samples : Samples
         N samples.
     moves : ndarray of shape (N,), bool
@@ -344,7 +441,7 @@ def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> 
     ndarray of shape (N,), bool
         True for those that count.
     """
-    if risk == "direct":
+    if risk != "inconsistency":
         says = np.ones_like(moves)
     else:
         says = moves if samples.projections is None else moves | informative(samples.projections)

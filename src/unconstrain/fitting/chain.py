@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FREE, CONSTRAINED = 0, 1
+NEVER = 1e-6
+"""A probability that is next to none, but leaves room for a sample of which something else is known."""
 
 # As if so many changes and stays had been seen before: a state lasts some 30 samples until the data say otherwise.
 CHANGES_BEFORE, STAYS_BEFORE = 1.0, 29.0
@@ -46,6 +48,12 @@ class Chain:
         """Probabilities from the state of a row to that of a column, (2, 2), the free state first."""
         a, b = self.leave_free, self.leave_constrained
         return np.array([[1 - a, a], [b, 1 - b]])
+
+    @classmethod
+    def held(cls, state: str) -> "Chain":
+        """Make the chain under which all samples are "free" or "constrained"."""
+        small = NEVER if state == "free" else 1 - NEVER
+        return cls(1 - small, small, 1 - small)
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,9 @@ def smooth(
     T = chain.transitions
     first = np.array([chain.free_share, 1 - chain.free_share])
     top = np.maximum(log_free, log_constrained)
-    likelihood = np.exp(np.maximum(np.stack([log_free, log_constrained], axis=1) - top[:, None], -MOST_TELLING))
+    likelihood = np.exp(
+        np.maximum(np.stack([log_free, log_constrained], axis=1) - top[:, None], -MOST_TELLING)
+    )
     moves = np.broadcast_to(T, (len(top), 2, 2)).copy()
     if log_kept is not None:
         moves[:, CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))

@@ -163,9 +163,7 @@ class Found(NamedTuple):
         gradient = unit * (free[:, None] * whole.gradient + not_free[:, None] * bent.gradient)
         error = free * (whole.across + unit / whole.variance * whole.along) + towards * bent.square
         parts = (free + blunt, along, towards, sphere.ahead, sphere.normal)
-        return Expanded.of(
-            views.P, gradient, error, *parts, known=self.known, projections=self.projections
-        )
+        return Expanded.of(views.P, gradient, error, *parts, known=self.known, projections=self.projections)
 
     def judge(self, scale: float) -> Expanded:
         """Make the observation by which parameters are judged that were not learnt from these samples.

@@ -54,6 +54,10 @@ class GlobalModel:
         """Turn a solution of the moments into parameters; see `Model.parameters`."""
         return w.T.reshape(-1)
 
+    def solution(self, parameters: np.ndarray, n_targets: int) -> np.ndarray:
+        """Turn parameters into a solution of the moments; see `Model.solution`."""
+        return parameters.reshape(n_targets, -1).T
+
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy; see `Model.evaluate`."""
         return self.features.evaluate(X, w)

@@ -83,6 +83,10 @@ class LocalModels:
         """Turn a solution of the moments into parameters; see `Model.parameters`."""
         return w.swapaxes(-1, -2).reshape(len(w), -1)
 
+    def solution(self, parameters: np.ndarray, n_targets: int) -> np.ndarray:
+        """Turn parameters into a solution of the moments; see `Model.solution`."""
+        return parameters.reshape(len(parameters), n_targets, -1).swapaxes(-1, -2)
+
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy; see `Model.evaluate`."""
         actions = np.zeros((len(X), self.n_actions))

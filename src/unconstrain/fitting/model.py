@@ -94,6 +94,23 @@ class Model(Protocol):
         """
         ...
 
+    def solution(self, parameters: np.ndarray, n_targets: int) -> np.ndarray:
+        """Turn parameters into the solution of moments that `parameters` makes them of.
+
+        Parameters
+        ----------
+        parameters : ndarray of shape (P,) or (S, P)
+            Parameters.
+        n_targets : int
+            K.
+
+        Returns
+        -------
+        ndarray of shape (..., P / K, K)
+            A solution of the moments.
+        """
+        ...
+
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy.
 

@@ -33,7 +33,7 @@ import numpy as np
 from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.motion import NO_MOTION, lengths
 
-RISKS = ("inconsistency", "direct")
+RISKS = ("adaptive", "inconsistency", "direct")
 
 
 class Observation(Protocol):
@@ -241,8 +241,7 @@ class Expanded:
     """The observation of log-likelihoods that are expanded about predictions p, to second order.
 
     `A = a (N - ââᵀ) + (a + b) ââᵀ + c n nᵀ` takes the place of `QᵀQ`, with N the identity where the projection is not
-    known, and `A p + g` that of `QᵀQ u`: the true action that would be best for one sample is not a number that there is
-    for every A.
+    known, and `A p + g` that of `QᵀQ u`: for most A there is no action u that would be best for the sample.
 
     Parameters
     ----------
@@ -369,9 +368,7 @@ class Expanded:
         products += distinct_products(self.ahead, self.along)
         products[i == j] += np.where(self.known, 0.0, self.blunt)
         if len(self.projections):
-            products[:, self.known] += (
-                self.blunt[self.known] * self.projections[:, i, j].T
-            )
+            products[:, self.known] += self.blunt[self.known] * self.projections[:, i, j].T
         if weights is not None:
             products *= weights
         return products
@@ -416,8 +413,8 @@ def observe(
 
     Parameters
     ----------
-    risk : {"inconsistency", "direct"}
-        Which risk.
+    risk : {"inconsistency", "direct", "whole"}
+        Which risk; "whole" is direct but where the projection is known.
     U : ndarray of shape (N, d)
         The actions.
     projections : ndarray of shape (N, d, d), optional
@@ -435,6 +432,11 @@ def observe(
         # Solvers square these, so they are in double precision.
         identities = np.broadcast_to(np.eye(d), (len(U), d, d))
         return Projected(identities, U.astype(np.float64, copy=False), whole=True)
+    if risk == "whole":
+        if projections is None:
+            return observe("direct", U)
+        rows = np.where(unknown(projections)[:, None, None], np.eye(d), projections)
+        return Projected(rows, np.einsum("nij,nj->ni", rows, U))
     along = _along_motion(U, r)
     if projections is None:
         return along

@@ -122,7 +122,7 @@ class EpisodeFolds:
 
 
 def choose_alpha(
-    folds: Sequence[Moments], decay_of: Callable[[Moments], Decay]
+    folds: Sequence[Moments], decay_of: Callable[[Moments], Decay], judges: Sequence[Moments] | None = None
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Choose the λ with the least risk on folds left out one at a time, or the largest that is as good.
 
@@ -135,6 +135,9 @@ def choose_alpha(
         One for each fold.
     decay_of : callable
         Says what the decay acts on where moments are solved; see `Model.decay`.
+    judges : sequence of Moments, optional
+        One for each fold: the risk that parameters are judged by which were learnt from the others. By default the risk
+        that they were learnt by.
 
     Returns
     -------
@@ -150,12 +153,13 @@ def choose_alpha(
     DataError
         Fewer than two folds hold data.
     """
+    judges = [judge for judge, fold in zip(judges or folds, folds, strict=True) if fold.n_samples]
     folds = [fold for fold in folds if fold.n_samples]
     if len(folds) < 2:
         raise DataError(ONE_FOLD)
     alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS)
     error = np.zeros(N_ALPHAS)
-    for i, held_out in enumerate(folds):
+    for i, held_out in enumerate(judges):
         train = Moments.sum(folds[:i] + folds[i + 1 :])
         candidates = decay_of(train).decompose(train).solve(alphas)
         error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)

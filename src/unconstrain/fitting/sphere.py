@@ -127,9 +127,7 @@ def blurred(sphere: Sphere, variance: Floats) -> Density:
     log = -0.5 * d * np.log(2 * np.pi * variance) - sphere.distance**2 / (2 * variance) + log_bessel
     # 1 - ratio falls as 1/κ, so these differences keep their digits.
     pulls_out, pulls_in = sphere.distance + R * (1 - ratio), -sphere.distance + rho * (1 - ratio)
-    by_policy = (pulls_out[:, None] * sphere.out - pulls_in[:, None] * sphere.ahead) / (
-        2 * variance[:, None]
-    )
+    by_policy = (pulls_out[:, None] * sphere.out - pulls_in[:, None] * sphere.ahead) / (2 * variance[:, None])
     squares = sphere.distance**2 + 2 * rho * R * (1 - ratio)
     return Density(log, by_policy, (squares / variance - d) / (2 * variance))
 
@@ -185,9 +183,7 @@ def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
         huge = kappa > FAR * max(nu, 1.0) ** 2
         bessel = ive(nu, np.where(huge, 1.0, kappa))
         fine = (bessel > 1e-290) & (kappa > least) & ~huge
-        log_mean[fine] = (
-            gammaln(d / 2) + nu * np.log(2 / kappa[fine]) + np.log(bessel[fine])
-        )
+        log_mean[fine] = gammaln(d / 2) + nu * np.log(2 / kappa[fine]) + np.log(bessel[fine])
         ratio[fine] = ive(nu + 1, kappa[fine]) / bessel[fine]
     if not fine.all():
         rest = ~fine & ~huge

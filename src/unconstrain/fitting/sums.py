@@ -3,7 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from typing import Any
 
+from unconstrain.fitting.contact import Tally
 from unconstrain.fitting.moments import Moments
 from unconstrain.motion import NO_MOTION
 
@@ -29,6 +31,10 @@ class Sums:
         Length of the longest action, in its unit.
     shortest : float
         Length of the shortest action that was counted as motion.
+    judges : tuple of Moments or None
+        By fold, of the risk that λ is chosen by where it is another than the one that is minimised.
+    tallies : tuple of Tally
+        What was found of contact and noise: one, or one for each of several beliefs that are compared.
     """
 
     moments: tuple[Moments | None, ...] = ()
@@ -37,18 +43,19 @@ class Sums:
     n_known: int = 0
     longest: float = 0.0
     shortest: float = math.inf
+    judges: tuple[Moments | None, ...] = ()
+    tallies: tuple[Tally, ...] = ()
 
     def __add__(self, other: "Sums") -> "Sums":
         return Sums(
-            tuple(
-                a if b is None else b if a is None else a + b
-                for a, b in zip_longest(self.moments, other.moments)
-            ),
+            _add(self.moments, other.moments),
             self.n_samples + other.n_samples,
             self.n_zero + other.n_zero,
             self.n_known + other.n_known,
             max(self.longest, other.longest),
             min(self.shortest, other.shortest),
+            _add(self.judges, other.judges),
+            _add(self.tallies, other.tallies),
         )
 
     def rotated(self, by: int, n_folds: int) -> "Sums":
@@ -66,10 +73,14 @@ class Sums:
         Sums
             Of the same samples.
         """
-        moments: list[Moments | None] = [None] * n_folds
-        for fold, part in enumerate(self.moments):
-            moments[(fold + by) % n_folds] = part
-        return replace(self, moments=tuple(moments))
+
+        def rename(parts: tuple[Moments | None, ...]) -> tuple[Moments | None, ...]:
+            renamed: list[Moments | None] = [None] * n_folds
+            for fold, part in enumerate(parts):
+                renamed[(fold + by) % n_folds] = part
+            return tuple(renamed) if parts else ()
+
+        return replace(self, moments=rename(self.moments), judges=rename(self.judges))
 
     @property
     def present(self) -> list[Moments]:
@@ -85,3 +96,8 @@ class Sums:
     def misjudged(self) -> bool:
         """Whether a sample was counted as motion that has none beside the longest action."""
         return self.shortest <= NO_MOTION * self.longest
+
+
+def _add(mine: tuple[Any, ...], others: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Add two tuples by their places; None is nothing."""
+    return tuple(a if b is None else b if a is None else a + b for a, b in zip_longest(mine, others))

@@ -23,6 +23,7 @@ from unconstrain.atomic import as_path
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
+from unconstrain.fitting.inference import infer_contact
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS
@@ -124,7 +125,10 @@ class Policy(RegressorMixin, BaseEstimator):
         fresh = copy(self)
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
         accumulator = fresh.start(samples)
-        accumulator.add(samples)
+        if self.risk == "adaptive":
+            accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
+        else:
+            accumulator.add(samples)
         return self._adopt_from(fresh, accumulator, scalars)
 
     def partial_fit(

@@ -1,0 +1,434 @@
+"""The passes over the data by which contact is inferred: whoever reads the data asks what to add up next.
+
+    inference = Inference(accumulator)
+    while (wanted := inference.next_pass()) is not None:
+        ...                                  # add all samples to `wanted`
+        inference.take(wanted)
+    inference.result                         # an accumulator as of any other risk
+
+A fit in memory, a stream and a cluster drive the same object. Expectation maximisation starts from ordinary regression,
+which is right where all is free, and from the inconsistency, which is right where nothing is; noise is lowered from what
+it seems to be at the start, so that no sample is judged by a policy that is not yet good. A third run goes on from the
+better end with noise in the speed as well. What is kept is what the held-out likelihood is largest for, and "all free" and
+"all constrained" are among the candidates: parameters are solved without each fold, noise is estimated on what was
+held out, and each sample is judged by itself, wherever on its sphere it lies.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from unconstrain.fitting.accumulator import Accumulator, Record
+from unconstrain.fitting.chain import Chain
+from unconstrain.fitting.contact import Belief
+from unconstrain.fitting.drift import Drift
+from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.noise import Noise
+
+COOLING = 0.8
+"""By what the noise's deviation is lowered from one pass to the next, at most."""
+
+MOST_PASSES, SETTLING = 60, 4
+"""Passes of a run at most, and those after the noise is found until which evidence is still adjusted."""
+
+PASSES_PER_CHOICE = 5
+"""After so many passes λ is chosen anew, until the evidence is fixed."""
+
+HALVINGS = 5
+ENOUGH = 1e-4
+"""Gain in log-likelihood, per independent sample, that is not worth another pass."""
+
+LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
+"""Deviation of the noise, as a share of the root mean square action; where speeds vary as well, a smaller one would let
+any single sample say how fast it was."""
+
+SPEED_AT_FIRST, LARGEST_SPEED = 0.1**2, 1.0
+FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, SPEED = (
+    "all free",
+    "all constrained",
+    "inferred, from regression",
+    "inferred, from inconsistency",
+    "inferred, with noise in speed",
+)
+SHORT_RUN = 12
+"""Passes of the runs that start where another ended."""
+
+
+@dataclass
+class Run:
+    """One course of expectation maximisation.
+
+    Parameters
+    ----------
+    name : str
+        What it assumes, or where it starts.
+    kinds : tuple of str
+        Which kinds of noise there are.
+    belief : Belief
+        That the next pass is made with.
+    most : int
+        Passes at most.
+    cooling : bool
+        Whether the noise is still being lowered.
+    """
+
+    name: str
+    kinds: tuple[str, ...]
+    belief: Belief
+    most: int = MOST_PASSES
+    cooling: bool = True
+    passes: int = 0
+    since_cool: int = 0
+    halvings: int = 0
+    is_done: bool = False
+    alpha: float | None = None
+    share_left: float = 1.0
+    log_likelihood: float = -np.inf
+    accepted: Accumulator | None = None
+
+    @property
+    def is_climbing(self) -> bool:
+        """Whether likelihoods of passes can be compared: evidence, and what decays, stay as they are."""
+        return not self.cooling and self.since_cool >= SETTLING
+
+    def take(self, done: Accumulator, floor: float) -> None:
+        """Take what a pass has added up, and decide on the next.
+
+        Parameters
+        ----------
+        done : Accumulator
+            Of the belief.
+        floor : float
+            Least variance of the noise.
+        """
+        (tally,) = done.total.tallies
+        self.passes += 1
+        gain = tally.log_likelihood - self.log_likelihood
+        if self.is_climbing and self.accepted is not None and self.since_cool > SETTLING:
+            if gain < 0:
+                self._halve()
+                return
+            self.is_done = gain < ENOUGH * self.belief.evidence * tally.n_samples
+        self.accepted, self.log_likelihood, self.halvings = done, tally.log_likelihood, 0
+        if self.passes >= self.most:
+            self.is_done = True
+        if not self.is_done:
+            self._step(done, floor)
+
+    def _halve(self) -> None:
+        """Go back half of the way to the belief before, or to the end."""
+        self.halvings += 1
+        if self.halvings > HALVINGS or self.passes >= self.most:
+            self.is_done = True
+            return
+        assert self.accepted is not None
+        before = self.accepted.belief
+        assert before is not None
+        self.belief = _between(before, self.belief)
+
+    def _step(self, done: Accumulator, floor: float) -> None:
+        belief, (tally,) = self.belief, done.total.tallies
+        if done.is_judged or self.alpha is None:
+            solution = done.solve()
+            self.alpha = solution.alpha
+            self.share_left = _share_left(done, self.alpha, tally.squares.count)
+            w = solution.w
+        else:
+            w = done.solve(self.alpha).w
+        shrunk = _shrinkage(done, belief.w, w)
+        noise = tally.squares.estimate(self.kinds, shrunk / self.share_left)
+        least = max(floor, belief.noise.action * COOLING**2 if self.cooling else 0.0)
+        if noise.action >= least or not self.cooling:
+            self.cooling = False
+            self.since_cool += 1
+        noise = replace(noise, action=max(noise.action, least), speed=min(noise.speed, LARGEST_SPEED))
+        self.belief = replace(
+            belief,
+            w=w,
+            noise=noise,
+            chain=belief.chain if belief.held else tally.counts.chain(),
+            drift=None if belief.drift is None else tally.drifts.estimate(),
+            evidence=belief.evidence if self.is_climbing else tally.evidence,
+        )
+
+
+@dataclass
+class Inference:
+    """What has been found so far, and what is to be added up next.
+
+    Parameters
+    ----------
+    blank : Accumulator
+        Empty, with everything placed.
+    """
+
+    blank: Accumulator
+    stage: str = "regression"
+    runs: list[Run] = field(default_factory=list)
+    compared: list[Run] = field(default_factory=list)
+    noises: list[Noise] = field(default_factory=list)
+    likelihoods: dict[str, float] = field(default_factory=dict)
+    starts: dict[str, Any] = field(default_factory=dict)
+    history: list[dict[str, Any]] = field(default_factory=list)
+    scale: float = 1.0
+    result: Accumulator | None = None
+
+    def next_pass(self) -> Accumulator | None:
+        """Say what to add up next.
+
+        Returns
+        -------
+        Accumulator or None
+            Empty; None once there is a result.
+        """
+        if self.result is not None:
+            return None
+        if self.stage in ("regression", "inconsistency"):
+            risk = "whole" if self.stage == "regression" else "inconsistency"
+            return self._blank(risk)
+        if self.stage == "run":
+            run = self.runs[-1]
+            wanted = self._blank("adaptive", run.belief)
+            wanted.is_judged = (
+                self.blank.alpha == "cv" and not run.is_climbing and run.passes % PASSES_PER_CHOICE == 0
+            )
+            return wanted
+        if self.stage == "final":
+            accepted = self.compared[0].accepted
+            assert accepted is not None
+            return self._blank("adaptive", accepted.belief)
+        wanted = self._blank("adaptive", self.runs[0].belief)
+        wanted.compared = tuple(
+            _held_out_beliefs(run, noise) for run, noise in zip(self.compared, self.noises, strict=True)
+        )
+        return wanted
+
+    def take(self, done: Accumulator) -> None:
+        """Take what `next_pass` asked for, with all samples added.
+
+        Parameters
+        ----------
+        done : Accumulator
+            As `next_pass` returned it, but filled.
+        """
+        if self.stage == "regression":
+            self._start(done, FREE)
+            self.stage = "inconsistency"
+        elif self.stage == "inconsistency":
+            self._start(done, CONSTRAINED)
+            self._run(FREE, self.starts[FREE], held="free", most=SHORT_RUN, cooling=False)
+            self.stage = "run"
+        elif self.stage == "run":
+            self._advance(done)
+        elif self.stage in ("noise", "likelihood"):
+            self._compare(done)
+        else:
+            done.record = Record(self.likelihoods, tuple(self.history))
+            self.result = done
+
+    @property
+    def description(self) -> str:
+        """What the next pass is for, in a few words."""
+        if self.stage == "run":
+            return f"{self.runs[-1].name}, pass {self.runs[-1].passes + 1}"
+        return {"regression": "regression", "inconsistency": "inconsistency", "final": "last pass"}.get(
+            self.stage, "held-out likelihood"
+        )
+
+    @property
+    def _floor(self) -> float:
+        beside_speed = self.stage == "run" and "speed" in self.runs[-1].kinds
+        return (
+            (LEAST_NOISE_BESIDE_SPEED if beside_speed else LEAST_NOISE) ** 2
+            * self.scale
+            / self.blank.model.n_actions
+        )
+
+    def _blank(self, risk: str, belief: Belief | None = None) -> Accumulator:
+        wanted = self.blank.empty()
+        wanted.risk, wanted.belief, wanted.scale = risk, belief, self.scale
+        return wanted
+
+    def _start(self, done: Accumulator, name: str) -> None:
+        solution = done.solve()
+        total, d = done.moments(), self.blank.model.n_actions
+        if name == FREE:
+            whole = total if total.everywhere is None else total.everywhere
+            self.scale = max(float(np.sum(whole.squares) / np.sum(whole.weight)), np.finfo(np.float64).tiny)
+            # Of local models each by itself.
+            left = solution.w
+            variance = _residual(done, left) / d
+        else:
+            variance = 0.25 * self.scale / d
+        self.starts[name] = Belief(solution.w, Noise(max(variance, self._floor)))
+
+    def _run(self, name: str, start: Belief, **options: Any) -> None:
+        held = options.pop("held", None)
+        drift = None if held or self.blank.model.n_actions == 1 else Drift()
+        kinds = options.pop("kinds", ("action",))
+        chain = Chain.held(held) if held else start.chain
+        belief = replace(start, held=held, drift=start.drift or drift, chain=chain)
+        self.runs.append(Run(name, kinds, belief, **options))
+
+    def _advance(self, done: Accumulator) -> None:
+        run = self.runs[-1]
+        run.take(done, self._floor)
+        (tally,) = done.total.tallies
+        assert done.belief is not None
+        self.history.append(
+            {
+                "run": run.name,
+                "log_likelihood": tally.log_likelihood / tally.n_samples,
+                "comparable": run.is_climbing and run.since_cool > SETTLING,
+                "accepted": run.accepted is done,
+                "noise": float(np.sqrt(done.belief.noise.action)),
+                "speed_noise": float(np.sqrt(done.belief.noise.speed)),
+                "free_share": float(tally.counts.states[0] / tally.counts.states.sum()),
+                "evidence": done.belief.evidence,
+                "alpha": run.alpha,
+            }
+        )
+        if run.is_done:
+            self._next_run()
+
+    def _next_run(self) -> None:
+        """Start the next run, or compare those there are."""
+        names = [run.name for run in self.runs]
+        if FROM_DIRECT not in names:
+            self._run(FROM_DIRECT, self.starts[FREE])
+        elif FROM_INCONSISTENCY not in names:
+            self._run(FROM_INCONSISTENCY, self.starts[CONSTRAINED])
+        elif not self.likelihoods:
+            self._begin_comparison(self.runs[1:])
+        elif SPEED not in names and self.blank.model.n_actions > 1:
+            noise = replace(self._best.noise, speed=SPEED_AT_FIRST)
+            start = replace(self._best, noise=noise)
+            self._run(SPEED, start, kinds=("action", "speed"), most=SHORT_RUN, cooling=False)
+            self.stage = "run"
+        elif CONSTRAINED not in names:
+            self._run(CONSTRAINED, self._best, held="constrained", most=SHORT_RUN, cooling=False)
+            self.stage = "run"
+        else:
+            self._begin_comparison(self.runs)
+
+    @property
+    def _best(self) -> Belief:
+        """The belief of the likeliest run, from which others go on."""
+        run = max(self.compared, key=lambda run: self.likelihoods[run.name])
+        assert run.accepted is not None
+        assert run.accepted.belief is not None
+        return run.accepted.belief
+
+    def _begin_comparison(self, runs: list[Run]) -> None:
+        self.compared = list(runs)
+        self.noises = [run.accepted.belief.noise for run in runs if run.accepted and run.accepted.belief]
+        self.stage = "noise"
+
+    def _compare(self, done: Accumulator) -> None:
+        results = list(zip(self.compared, done.total.tallies, strict=True))
+        if self.stage == "noise":
+            found = [tally.squares.estimate(run.kinds) for run, tally in results]
+            self.noises = [replace(noise, action=max(noise.action, self._floor)) for noise in found]
+            self.stage = "likelihood"
+            return
+        self.likelihoods = {run.name: tally.log_likelihood / tally.n_samples for run, tally in results}
+        if len(self.compared) < len(self.runs):
+            self._next_run()
+            return
+        best = max(self.compared, key=lambda run: self.likelihoods[run.name])
+        self.likelihoods = dict(sorted(self.likelihoods.items(), key=lambda item: item[0] != best.name))
+        self.compared = [best]
+        self.stage = "final"
+
+
+def infer_contact(blank: Accumulator, add: Callable[[Accumulator], None]) -> Accumulator:
+    """Make all passes.
+
+    Parameters
+    ----------
+    blank : Accumulator
+        Empty, with everything placed.
+    add : callable
+        Adds all samples to an accumulator.
+
+    Returns
+    -------
+    Accumulator
+        With the sums of the last pass.
+    """
+    inference = Inference(blank)
+    while (wanted := inference.next_pass()) is not None:
+        add(wanted)
+        inference.take(wanted)
+    assert inference.result is not None
+    return inference.result
+
+
+def _held_out_beliefs(run: Run, noise: Noise) -> tuple[Belief, ...]:
+    """Return a belief for each fold, with parameters that are solved without it."""
+    accepted = run.accepted
+    assert accepted is not None
+    assert accepted.belief is not None
+    plain = replace(accepted.belief, noise=noise, drift=None, evidence=1.0)
+    present = [k for k, part in enumerate(accepted.total.moments) if part is not None]
+    if accepted.folds is None or len(present) < 2:
+        return (plain,)
+    alpha = run.alpha if run.alpha is not None else accepted.solve().alpha
+    return tuple(
+        replace(plain, w=accepted.solve(alpha, without=k).w) if k in present else plain
+        for k in range(accepted.folds.n_folds)
+    )
+
+
+def _between(a: Belief, b: Belief) -> Belief:
+    """Return the belief halfway from a to b."""
+
+    def middle(x: Any, y: Any) -> Any:
+        return type(x)(*((getattr(x, name) + getattr(y, name)) / 2 for name in vars(x)))
+
+    drift = None if a.drift is None or b.drift is None else middle(a.drift, b.drift)
+    return replace(
+        b,
+        w=(a.w + b.w) / 2,
+        noise=middle(a.noise, b.noise),
+        chain=middle(a.chain, b.chain),
+        drift=drift,
+    )
+
+
+def _errors(moments: Moments, w: np.ndarray) -> float:
+    return float(np.sum(moments.risk(w[..., :, None, :])))
+
+
+def _solved(done: Accumulator, w: np.ndarray) -> tuple[Moments, np.ndarray]:
+    """Return the moments without those of all samples, and parameters in the form in which moments take them."""
+    total = replace(done.moments(), everywhere=None)
+    return total, done.model.solution(w, total.g.shape[-1])
+
+
+def _residual(done: Accumulator, w: np.ndarray) -> float:
+    """Compute the mean squared error of the parameters."""
+    total, solved = _solved(done, w)
+    return _errors(total, solved) / max(float(np.sum(total.weight)), np.finfo(np.float64).tiny)
+
+
+def _shrinkage(done: Accumulator, before: np.ndarray, after: np.ndarray) -> float:
+    """By what the squared errors change from one solution to the next."""
+    total, old = _solved(done, before)
+    _, new = _solved(done, after)
+    error = _errors(total, old)
+    return float(np.clip(_errors(total, new) / error, 0.05, 1.0)) if error > 0 else 1.0
+
+
+def _share_left(done: Accumulator, alpha: float, count: float) -> float:
+    """Share of the residuals' freedom that is left once the parameters are fitted."""
+    total = done.moments()
+    if total.H.ndim > 2:  # neighbouring local models share their samples
+        return 1.0
+    decay = done.model.decay(total)
+    standard = decay.standardize(total)
+    values = np.maximum(np.linalg.eigvalsh(standard.H), 0.0)
+    used = float(np.sum(values / (values + alpha * decay.scale + np.finfo(np.float64).tiny)))
+    return max(1.0 - used / max(count, 1.0), 0.2)

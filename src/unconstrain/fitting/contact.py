@@ -1,7 +1,7 @@
 """Which samples were free, inferred: what a sample says of the policy hangs on how the policy so far explains it.
 
-Each sample is free or constrained, and which is hidden. A belief (parameters, noise, chain) gives the probability γ that
-a sample was free, and with it what the sample says: an expansion of its expected log-likelihood about the
+Each sample is free or constrained, and which is hidden. A belief (parameters, noise, chain) gives the probability γ
+that a sample was free, and with it what the sample says: an expansion of its expected log-likelihood about the
 prediction p,
 
     ℓ(p') ≈ ℓ(p) + gᵀ(p' - p) - (p' - p)ᵀ A (p' - p) / 2,
@@ -12,9 +12,9 @@ with the exact gradients, and informations in place of curvatures: n is the grad
 So a fit is again a sum of moments, `H = Σ Φᵀ A Φ` and `Σ Φᵀ (A p + g)`, and repeating it is expectation
 maximisation, each maximisation one step of Fisher scoring.
 
-Residuals of a model that does not quite fit change slowly along an episode, and a hundred samples then tell no more than
-one. So log-likelihoods count as much as there are independent samples, `(1 - φ) / (1 + φ)` of them for residuals of
-correlation φ from one sample to the next.
+Residuals of a model that does not quite fit change slowly along an episode, and a hundred samples then tell no more
+than one. So log-likelihoods count as much as there are independent samples, `(1 - φ) / (1 + φ)` of them for residuals
+of correlation φ from one sample to the next.
 
 References
 ----------

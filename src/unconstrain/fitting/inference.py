@@ -6,12 +6,13 @@
         inference.take(wanted)
     inference.result                         # an accumulator as of any other risk
 
-A fit in memory, a stream and a cluster drive the same object. Expectation maximisation starts from ordinary regression,
-which is right where all is free, and from the inconsistency, which is right where nothing is; noise is lowered from what
-it seems to be at the start, so that no sample is judged by a policy that is not yet good. A third run goes on from the
-better end with noise in the speed as well. What is kept is what the held-out likelihood is largest for, and "all free" and
-"all constrained" are among the candidates: parameters are solved without each fold, noise is estimated on what was
-held out, and each sample is judged by itself, wherever on its sphere it lies.
+A fit in memory, a stream and a cluster drive the same object. Expectation maximisation starts from ordinary
+regression, which is right where all is free, and from the inconsistency, which is right where nothing is; noise is
+lowered from what it seems to be at the start, so that no sample is judged by a policy that is not yet good. Where
+residuals are independent, a third run goes on from the better end with noise in the speed as well. What is kept is the
+simplest of "all free" and these whose held-out likelihood none of the others clearly beats: parameters are solved
+without each fold, and noise is estimated on what was held out. "All constrained" is fitted too, but only told: it
+explains anything, and where it is right inference finds it.
 """
 
 from collections.abc import Callable
@@ -52,6 +53,12 @@ FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, SPEED = (
     "inferred, from inconsistency",
     "inferred, with noise in speed",
 )
+INDEPENDENT = 0.5
+"""Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
+
+NOTICEABLE = 0.1
+"""Gain in held-out log-likelihood, per independent sample, for which another run is preferred."""
+
 SHORT_RUN = 12
 """Passes of the runs that start where another ended."""
 
@@ -87,6 +94,12 @@ class Run:
     share_left: float = 1.0
     log_likelihood: float = -np.inf
     accepted: Accumulator | None = None
+
+    @property
+    def evidence(self) -> float:
+        """How many independent samples a sample is worth where the run ended."""
+        assert self.accepted is not None
+        return self.accepted.total.tallies[0].evidence
 
     @property
     def is_climbing(self) -> bool:
@@ -266,7 +279,7 @@ class Inference:
 
     def _run(self, name: str, start: Belief, **options: Any) -> None:
         held = options.pop("held", None)
-        drift = None if held or self.blank.model.n_actions == 1 else Drift()
+        drift = None if held == "free" or self.blank.model.n_actions == 1 else Drift()
         kinds = options.pop("kinds", ("action",))
         chain = Chain.held(held) if held else start.chain
         belief = replace(start, held=held, drift=start.drift or drift, chain=chain)
@@ -302,7 +315,7 @@ class Inference:
             self._run(FROM_INCONSISTENCY, self.starts[CONSTRAINED])
         elif not self.likelihoods:
             self._begin_comparison(self.runs[1:])
-        elif SPEED not in names and self.blank.model.n_actions > 1:
+        elif SPEED not in names and self.blank.model.n_actions > 1 and self._likeliest().evidence > INDEPENDENT:
             noise = replace(self._best.noise, speed=SPEED_AT_FIRST)
             start = replace(self._best, noise=noise)
             self._run(SPEED, start, kinds=("action", "speed"), most=SHORT_RUN, cooling=False)
@@ -316,10 +329,22 @@ class Inference:
     @property
     def _best(self) -> Belief:
         """The belief of the likeliest run, from which others go on."""
-        run = max(self.compared, key=lambda run: self.likelihoods[run.name])
-        assert run.accepted is not None
-        assert run.accepted.belief is not None
-        return run.accepted.belief
+        accepted = self._likeliest().accepted
+        assert accepted is not None
+        assert accepted.belief is not None
+        return accepted.belief
+
+    def _likeliest(self) -> Run:
+        """Choose the run whose likelihood is larger by more than `NOTICEABLE` than those of all before it."""
+        ranks = {name: rank for rank, name in enumerate((FREE, FROM_DIRECT, FROM_INCONSISTENCY, SPEED))}
+        best, *others = sorted(
+            (run for run in self.compared if run.name in ranks), key=lambda run: ranks[run.name]
+        )
+        for run in others:
+            gain = self.likelihoods[run.name] - self.likelihoods[best.name]
+            if gain * min(run.evidence, best.evidence) > NOTICEABLE:
+                best = run
+        return best
 
     def _begin_comparison(self, runs: list[Run]) -> None:
         self.compared = list(runs)
@@ -337,7 +362,7 @@ class Inference:
         if len(self.compared) < len(self.runs):
             self._next_run()
             return
-        best = max(self.compared, key=lambda run: self.likelihoods[run.name])
+        best = self._likeliest()
         self.likelihoods = dict(sorted(self.likelihoods.items(), key=lambda item: item[0] != best.name))
         self.compared = [best]
         self.stage = "final"
@@ -371,7 +396,7 @@ def _held_out_beliefs(run: Run, noise: Noise) -> tuple[Belief, ...]:
     accepted = run.accepted
     assert accepted is not None
     assert accepted.belief is not None
-    plain = replace(accepted.belief, noise=noise, drift=None, evidence=1.0)
+    plain = replace(accepted.belief, noise=noise, evidence=1.0)
     present = [k for k, part in enumerate(accepted.total.moments) if part is not None]
     if accepted.folds is None or len(present) < 2:
         return (plain,)

@@ -43,6 +43,8 @@ def touched(U, episodes, seed=0):
         forces[contact] += rng.uniform(1.0, 6.0) * normal[contact - own[0]]
         free[own[-4:]] = 1.0
         N[own] = np.eye(3) - normal[:, :, None] * normal[:, None]
+        # Where the next movement begins elsewhere, actions that are differentiated are no motion along anything.
+        N[own[:6]] = N[own[-6:]] = np.nan
     N[rng.random(len(U)) < 1 / 3] = np.nan
     rows = [None if np.isnan(row).any() else row for row in N.reshape(-1, 9)]
     return {

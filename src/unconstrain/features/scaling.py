@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unconstrain.arrays import SQUARABLE
+
 NO_SPREAD = 1e-12
 """Share of a column's largest number below which its spread is the rounding of a constant."""
 
@@ -42,8 +44,8 @@ class Scaling:
         Returns
         -------
         Scaling
-            A column without spread gets its own size as the unit, or one where it is zero: nothing hangs on it, but
-            what is there afterwards is finite.
+            A column without spread gets its own size as the unit, or one where that is next to zero: nothing hangs on
+            it, but what is there afterwards is finite.
         """
         X = np.asarray(X, dtype=np.float64)
         if sample_weight is not None and not np.any(sample_weight):
@@ -53,8 +55,8 @@ class Scaling:
         mean = first + np.average(X - first, axis=0, weights=sample_weight)
         away = np.abs(X - mean)
         farthest, largest = away.max(axis=0), np.abs(X).max(axis=0)
-        still = farthest <= NO_SPREAD * largest
-        unit = np.where(still, np.where(largest > 0, largest, 1.0), farthest)
+        still = farthest <= np.maximum(NO_SPREAD * largest, 1 / SQUARABLE)
+        unit = np.where(still, np.where(largest > 1 / SQUARABLE, largest, 1.0), farthest)
         # The largest deviation is taken out: the square of a state may be more than double precision holds.
         share = np.sqrt(np.average((away / unit) ** 2, axis=0, weights=sample_weight))
         # A weight of next to nothing may leave a spread that is next to nothing too.

@@ -25,7 +25,14 @@ Source: Howard, Klanke, Gienger, Goerick, Vijayakumar, ICRA 2009, equations (4) 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from unconstrain.arrays import SQUARABLE, check_actions, check_number, check_projections, check_squarable
+from unconstrain.arrays import (
+    SQUARABLE,
+    check_actions,
+    check_number,
+    check_numbers,
+    check_projections,
+    check_squarable,
+)
 from unconstrain.errors import DataError
 from unconstrain.motion import directions
 
@@ -33,10 +40,14 @@ __all__ = [
     "constrained_policy_error",
     "direct",
     "explained",
+    "free_error",
     "inconsistency",
+    "mean_angle",
     "normalized",
     "projected_observation_error",
     "projected_policy_error",
+    "root_mean_square",
+    "shown_error",
     "unconstrained_policy_error",
 ]
 
@@ -248,7 +259,7 @@ def normalized(error: float, Pi: ArrayLike) -> float:
     return check_number(error, "the error", positive=False) / variance
 
 
-def explained(U: ArrayLike, P: ArrayLike) -> float:
+def explained(U: ArrayLike, P: ArrayLike, free: ArrayLike | None = None) -> float:
     """Compute the share of observed motion that predictions explain.
 
     Parameters
@@ -257,12 +268,14 @@ def explained(U: ArrayLike, P: ArrayLike) -> float:
         Recorded actions, of any magnitude.
     P : array_like of shape (N, d)
         Predicted actions, in the same unit.
+    free : array_like of shape (N,), optional
+        Probability γ that nothing was in the way of a sample; 0 by default.
 
     Returns
     -------
     float
-        `1 - Σ (r - û·p)² / Σ r²`: 1 for a policy consistent with every sample, 0 for one that says "do not move",
-        negative for a policy that is worse than that.
+        `1 - Σ [γ ‖u - p‖² + (1 - γ) (r - û·p)²] / Σ r²`: 1 for a policy consistent with every sample, 0 for one that
+        says "do not move", negative for a policy that is worse than that.
 
     Raises
     ------
@@ -277,8 +290,129 @@ def explained(U: ArrayLike, P: ArrayLike) -> float:
         raise DataError(
             "predictions are so much larger than the actions that their squares cannot be compared"
         )
-    scaled = U / largest
-    return 1.0 - inconsistency(scaled, P / largest) / float(np.mean(_squares(scaled)))
+    U, P = np.asarray(U / largest), np.asarray(P / largest)
+    motion = float(np.mean(_squares(U)))
+    if free is None:
+        return 1.0 - inconsistency(U, P) / motion
+    return 1.0 - shown_error(U, P, free) / motion
+
+
+def shown_error(U: ArrayLike, P: ArrayLike, free: ArrayLike) -> float:
+    """Compare predictions with what recordings show: whole actions where they were free, their motion elsewhere.
+
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+    free : array_like of shape (N,)
+        Probability γ that nothing was in the way of a sample, such as a policy's `free_probability`.
+
+    Returns
+    -------
+    float
+        `1/N Σ [γ ‖u - p‖² + (1 - γ) (r - ûᵀp)²]`, in squared units of the action.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, or a probability is none.
+    """
+    U, P = _check_pair(U, P, "actions", "predictions")
+    gamma = _check_probabilities(free, len(U))
+    unit, r = directions(U)
+    along = (r - np.einsum("nd,nd->n", unit, P)) ** 2
+    return float(np.mean(gamma * _squares(U - P) + (1 - gamma) * along))
+
+
+def free_error(U: ArrayLike, P: ArrayLike, free: ArrayLike) -> float:
+    """Compare predictions with whole actions, on samples that were free.
+
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+    free : array_like of shape (N,)
+        Probability γ that nothing was in the way of a sample, inferred or known.
+
+    Returns
+    -------
+    float
+        `Σ γ ‖u - p‖² / Σ γ`, in squared units of the action.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, a probability is none, or nothing was free.
+    """
+    U, P = _check_pair(U, P, "actions", "predictions")
+    gamma = _check_probabilities(free, len(U))
+    if not gamma.any():
+        raise DataError("no sample is free, so there is no whole action to compare with")
+    return float(gamma @ _squares(U - P) / gamma.sum())
+
+
+def root_mean_square(U: ArrayLike, P: ArrayLike) -> float:
+    """Compute the root mean square length of the difference between predictions and actions.
+
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions, or those of the true policy.
+    P : array_like of shape (N, d)
+        Predicted actions, in the same unit.
+
+    Returns
+    -------
+    float
+        `√(1/N Σ ‖u - p‖²)`, in the unit of the actions.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match or entries are not finite.
+    """
+    return float(np.sqrt(direct(U, P)))
+
+
+def mean_angle(U: ArrayLike, P: ArrayLike) -> float:
+    """Compute the mean angle between predictions and actions.
+
+    Parameters
+    ----------
+    U : array_like of shape (N, d)
+        Recorded actions, or those of the true policy.
+    P : array_like of shape (N, d)
+        Predicted actions.
+
+    Returns
+    -------
+    float
+        In radians, 0 to π. Samples at which either does not move have no angle, and are left out.
+
+    Raises
+    ------
+    DataError
+        If shapes do not match, entries are not finite, or nothing moves.
+    """
+    U, P = _check_shapes(U, P, "actions", "predictions")
+    (u, r), (p, q) = directions(U), directions(P)
+    both = (r > 0) & (q > 0)
+    if not both.any():
+        raise DataError("no sample at which both move: there is no angle between them")
+    u, p = u[both], p[both]
+    # Accurate where they nearly agree, unlike the cosine's inverse.
+    return float(np.mean(2 * np.arctan2(np.linalg.norm(u - p, axis=1), np.linalg.norm(u + p, axis=1))))
+
+
+def _check_probabilities(free: ArrayLike, n_samples: int) -> np.ndarray:
+    gamma = check_numbers(free, "free")
+    if gamma.shape != (n_samples,) or not np.all((gamma >= 0) & (gamma <= 1)):
+        raise DataError(f"free must hold {n_samples} probabilities, one for each sample, of 0 to 1")
+    return gamma
 
 
 def _squares(E: np.ndarray) -> np.ndarray:

@@ -28,3 +28,19 @@ class Samples(NamedTuple):
     groups: NDArray[Any] | None = None
     projections: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
+
+    def select(self, rows: NDArray[Any]) -> "Samples":
+        """Select some of the samples.
+
+        Parameters
+        ----------
+        rows : ndarray of int or bool
+            Which.
+
+        Returns
+        -------
+        Samples
+            These.
+        """
+        taken = [None if each is None else each[rows] for each in self]
+        return Samples(*taken)  # type: ignore[arg-type]

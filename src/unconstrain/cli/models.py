@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from unconstrain.policies.base import Policy
 
 MODELS = ("linear", "rbf", "locally-linear", "auto")
-RISKS = ("inconsistency", "direct")
+RISKS = ("adaptive", "inconsistency", "direct")
 PLACEMENTS = ("grid", "kmeans", "coverage")
 PLACED = ("centers", "n_centers", "width")
 """Options of models that have centres."""
@@ -29,7 +29,7 @@ class Model:
     """
 
     name: str = "locally-linear"
-    risk: str = "inconsistency"
+    risk: str = "adaptive"
     alpha: float | str = "cv"
     centers: str | None = None
     n_centers: int | None = None
@@ -39,7 +39,7 @@ class Model:
         placed = list(self._placed())
         if self.name == "linear" and placed:
             raise PolicyError(f"the linear model has no centres: leave out {placed[0]}=")
-        if self.is_chosen and (placed or self.alpha != "cv" or self.risk != "inconsistency"):
+        if self.is_chosen and (placed or self.alpha != "cv" or self.risk != "adaptive"):
             raise PolicyError(
                 "--model auto makes its own choices: leave out risk=, alpha=, centers=, n_centers= and width="
             )
@@ -80,9 +80,10 @@ model = gathered(
         option(
             "--risk",
             type=click.Choice(RISKS),
-            default="inconsistency",
+            default="adaptive",
             show_default=True,
-            help="What is minimised; direct is ordinary regression.",
+            help="What is learnt from: adaptive infers which samples were free; inconsistency takes none for free; "
+            "direct, ordinary regression, takes all.",
             section="Model",
         ),
         option(

@@ -13,7 +13,6 @@ import numpy as np
 
 from unconstrain.diagnostics.information import Information
 from unconstrain.diagnostics.spectrum import compute_directions, compute_shares
-from unconstrain.fitting.observation import observe
 from unconstrain.parallel import cut_blocks
 from unconstrain.policies.base import Policy
 from unconstrain.samples import Samples
@@ -69,7 +68,7 @@ def compute_contributions(
     labels, number = np.unique(episodes, return_inverse=True)
     held = np.bincount(number, compute_leverages(policy, information, samples, threshold), len(labels))
     order = np.argsort(held)
-    observation = observe("inconsistency", samples.actions, samples.projections)
+    observation = policy.observe(samples)
 
     def determined_without(n_dropped: int) -> float:
         rows = np.flatnonzero(np.isin(number, order[:n_dropped]))
@@ -116,13 +115,15 @@ def compute_leverages(
     """
     # A = R Rᵀ
     roots = [one.vectors / np.sqrt(one.shares + threshold) for one in compute_directions(information)]
-    X, observation = samples.states, observe("inconsistency", samples.actions, samples.projections)
+    X, observation = samples.states, policy.observe(samples)
     result = np.zeros(len(X))
     width = max(root.shape[1] for root in roots) + information.moments.H.shape[-1]
     for rows in cut_blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
-        Q, reach = observation[rows].rows, policy.model_.reach(X[rows])
+        part, reach = observation[rows], policy.model_.reach(X[rows])
+        Q, counts = part.rows, part.row_weights
         for k in range(observation.n_rows):
             V = policy.model_.along(X[rows], Q[:, k])
             for root, weight in zip(roots, reach.T, strict=True):
-                result[rows] += weight * np.sum((V @ root) ** 2, axis=1)
+                counted = weight if counts is None else weight * counts[:, k]
+                result[rows] += counted * np.sum((V @ root) ** 2, axis=1)
     return result if samples.weights is None else result * samples.weights

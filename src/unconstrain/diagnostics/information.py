@@ -45,7 +45,7 @@ class Information:
         Parameters
         ----------
         policy : Policy
-            Fitted. Its own risk does not matter.
+            Fitted. With the adaptive risk samples show what is inferred of them, else what lies along their motion.
         samples : Samples
             Checked; each has motion or a known projection.
 
@@ -55,8 +55,8 @@ class Information:
             Of these samples.
         """
         model, X, U, weights = policy.model_, samples.states, samples.actions, samples.weights
-        moments = model.moments(X, observe("inconsistency", U, samples.projections), weights)
-        if samples.projections is None and model.shares_basis:
+        moments = model.moments(X, policy.observe(samples), weights)
+        if samples.projections is None and model.shares_basis and policy.solution_.belief is None:
             return cls(moments, _sum_diagonal_blocks(moments.H, policy.n_actions_))
         whole = model.moments(X, observe("direct", U), weights).H
         return cls(moments, whole.reshape(-1, *whole.shape[-2:]))
@@ -78,10 +78,10 @@ class Information:
         Raises
         ------
         PolicyError
-            The moments do not hold G: for features without a shared basis, for the direct risk, or where projections
-            were known.
+            The moments do not hold G: for features without a shared basis, for other risks than the inconsistency, or
+            where projections were known.
         """
-        if not policy.model_.shares_basis or policy.risk == "direct" or policy.n_known_constraints_:
+        if not policy.model_.shares_basis or policy.risk != "inconsistency" or policy.n_known_constraints_:
             raise PolicyError(
                 "the moments of this policy do not say what full observation would have shown: give the recordings, "
                 "identifiability(policy, X, U)"

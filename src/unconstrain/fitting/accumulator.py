@@ -406,7 +406,7 @@ class Accumulator:
         tallies = []
         for k in np.unique(fold).tolist():
             rows = fold == k
-            part = Samples(*(None if each is None else each[rows] for each in samples))
+            part = samples.select(rows)
             tallies.append(infer(self.model, beliefs[k], part).tally)
         total = tallies[0]
         for tally in tallies[1:]:

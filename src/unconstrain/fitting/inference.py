@@ -315,7 +315,9 @@ class Inference:
             self._run(FROM_INCONSISTENCY, self.starts[CONSTRAINED])
         elif not self.likelihoods:
             self._begin_comparison(self.runs[1:])
-        elif SPEED not in names and self.blank.model.n_actions > 1 and self._likeliest().evidence > INDEPENDENT:
+        elif (
+            SPEED not in names and self.blank.model.n_actions > 1 and self._likeliest().evidence > INDEPENDENT
+        ):
             noise = replace(self._best.noise, speed=SPEED_AT_FIRST)
             start = replace(self._best, noise=noise)
             self._run(SPEED, start, kinds=("action", "speed"), most=SHORT_RUN, cooling=False)

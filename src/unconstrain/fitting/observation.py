@@ -12,6 +12,9 @@ so all it uses of a sample is `Q_n` and `Q_n u_n`:
 | inconsistency | its projection is known     | N_n  | u_n     | ‖u_n - N_n p_n‖² |
 | direct        | any                         | I    | u_n     | ‖u_n - p_n‖²     |
 
+The adaptive risk is a mixture of the first and the last, sample by sample, with weights that hang on the policy so far
+(`contact`); `Expanded` is its observation.
+
 with `r = ‖u‖` and `û = u / r`. `û ûᵀ` projects onto a line that surely lies in the image of the unknown N, so the true
 policy has no inconsistency, whatever the constraints were. For every model
 

@@ -70,7 +70,13 @@ class Posterior:
     log_evidence: np.ndarray
 
     @classmethod
-    def of(cls, moments: Moments, numbers_per_sample: int = 1, decay: Decay | None = None) -> "Posterior":
+    def of(
+        cls,
+        moments: Moments,
+        numbers_per_sample: int = 1,
+        decay: Decay | None = None,
+        noise: float | None = None,
+    ) -> "Posterior":
         """Compute the posterior that moments determine.
 
         Parameters
@@ -81,6 +87,8 @@ class Posterior:
             How many numbers each sample shows: 1, or d where nothing is projected.
         decay : Decay, optional
             Which parameters the prior is about; by default those that the moments are of.
+        noise : float, optional
+            Variance σ², in squared units of the action, where it is known; by default it is estimated with λ.
 
         Returns
         -------
@@ -88,26 +96,28 @@ class Posterior:
             Of the parameters.
         """
         if decay is None:
-            return cls._of_standardized(moments, numbers_per_sample)
-        found = cls._of_standardized(decay.standardize(moments), numbers_per_sample)
+            return cls._of_standardized(moments, numbers_per_sample, noise)
+        found = cls._of_standardized(decay.standardize(moments), numbers_per_sample, noise)
         covariance = decay.restore_covariance(found.covariance)
         return replace(found, mean=decay.restore(found.mean), covariance=covariance)
 
     @classmethod
-    def _of_standardized(cls, moments: Moments, numbers_per_sample: int) -> "Posterior":
+    def _of_standardized(cls, moments: Moments, numbers_per_sample: int, noise: float | None) -> "Posterior":
         if moments.everywhere is not None:
-            whole = cls._of_standardized(moments.everywhere, numbers_per_sample)
-            return cls._about(whole, moments, numbers_per_sample)
-        return cls._about_zero(moments, numbers_per_sample)[0]
+            whole = cls._of_standardized(moments.everywhere, numbers_per_sample, noise)
+            return cls._about(whole, moments, numbers_per_sample, noise)
+        return cls._about_zero(moments, numbers_per_sample, noise)[0]
 
     @classmethod
-    def _about(cls, whole: "Posterior", moments: Moments, numbers_per_sample: int) -> "Posterior":
+    def _about(
+        cls, whole: "Posterior", moments: Moments, numbers_per_sample: int, noise: float | None
+    ) -> "Posterior":
         """Compute the posterior of local models about that of all samples together."""
         m = whole.mean
         Hm = moments.H @ m
         squares = moments.squares + np.einsum("pk,...pk->...", m, Hm - 2 * moments.g)
         apart = replace(moments, g=moments.g - Hm, squares=np.maximum(squares, 0.0), everywhere=None)
-        found, inverse = cls._about_zero(apart, numbers_per_sample, moments.squares, shared=True)
+        found, inverse = cls._about_zero(apart, numbers_per_sample, noise, moments.squares, shared=True)
         A = found.decay[..., None, None] * inverse
         spread = A @ whole.covariance @ A
         spread = (spread + spread.swapaxes(-1, -2)) / 2
@@ -118,6 +128,7 @@ class Posterior:
         cls,
         moments: Moments,
         numbers_per_sample: int,
+        known_noise: float | None,
         sizes: np.ndarray | None = None,
         *,
         shared: bool = False,
@@ -126,7 +137,7 @@ class Posterior:
         from scipy.linalg import cho_factor, cho_solve
 
         batch, P = moments.squares.shape, moments.H.shape[-1]
-        search = _Evidence(moments, numbers_per_sample, sizes)
+        search = _Evidence(moments, numbers_per_sample, known_noise, sizes)
         decay = search.decay()
         noise = search.noise(np.log(decay), search.every)
         if shared:
@@ -150,7 +161,14 @@ class Posterior:
 class _Evidence:
     """`-log p(data | λ)` of S models side by side, as a function of log λ."""
 
-    def __init__(self, moments: Moments, numbers_per_sample: int, sizes: np.ndarray | None = None):
+    def __init__(
+        self,
+        moments: Moments,
+        numbers_per_sample: int,
+        known_noise: float | None,
+        sizes: np.ndarray | None = None,
+    ):
+        self.known_noise = known_noise
         spectrum, P = moments.decompose(), moments.H.shape[-1]
         self.values = np.maximum(spectrum.values.reshape(-1, P), 0.0)
         pulls = np.sum(spectrum.along**2, axis=-1) * spectrum.determined
@@ -164,14 +182,22 @@ class _Evidence:
         self.every = np.arange(len(self.squares))
 
     def noise(self, log_decay: np.ndarray, models: np.ndarray) -> np.ndarray:
-        """Compute σ² of the largest likelihood for λ, never below the rounding of s."""
+        """Compute σ² of the largest likelihood for λ, never below the rounding of s, unless it is known."""
+        if self.known_noise is not None:
+            shape = np.broadcast_shapes(np.shape(log_decay), np.shape(models))
+            return np.full(shape, self.known_noise)
         explained = self.pulls[models] / (self.values[models] + np.exp(log_decay)[..., None])
         return np.maximum(self.squares[models] - explained.sum(axis=-1), self.floor[models]) / self.n[models]
 
     def surprise(self, log_decay: np.ndarray, models: np.ndarray) -> np.ndarray:
         """Compute `-log p(data | λ)`."""
         shrunk = np.sum(np.log1p(self.values[models] * np.exp(-log_decay)[..., None]), axis=-1)
-        misfit = np.log(2 * np.pi * self.noise(log_decay, models)) + 1.0
+        noise = self.noise(log_decay, models)
+        misfit = np.log(2 * np.pi * noise) + 1.0
+        if self.known_noise is not None:
+            explained = self.pulls[models] / (self.values[models] + np.exp(log_decay)[..., None])
+            left = self.squares[models] - explained.sum(axis=-1)
+            misfit += left / (self.n[models] * noise) - 1.0
         return 0.5 * (self.n[models] * misfit + self.n_targets * shrunk)
 
     def shared_spread(self, noise: np.ndarray) -> float:

@@ -23,10 +23,11 @@ from unconstrain.atomic import as_path
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
+from unconstrain.fitting.contact import Belief, infer
 from unconstrain.fitting.inference import infer_contact
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import RISKS
+from unconstrain.fitting.observation import RISKS, Observation, observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import moving
 from unconstrain.policies.inputs import check_input
@@ -142,6 +143,9 @@ class Policy(RegressorMixin, BaseEstimator):
     ) -> Self:
         """Learn from more samples; the result is that of one `fit` on all samples so far.
 
+        With the adaptive risk it is not: which of the new samples were free is inferred by the policy as it is before
+        them, once, and what earlier ones were taken for stays. So begin with enough of them, or fit anew.
+
         That is exact whatever the pieces when λ is a number and nothing is placed by the data (linear features,
         centres and width given). Centres and other data-dependent features are placed by the first piece and kept; with
         `alpha="cv"` give `groups`, whose episodes stay in their fold from piece to piece.
@@ -205,8 +209,12 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         self.check_options()
         X, U, weights = samples.states, samples.actions, samples.weights
-        counted = find_informative_samples(self.risk, samples, moving(U))
-        if not counted.any():
+        moves = moving(U)
+        counted = find_informative_samples(self.risk, samples, moves)
+        shows = (
+            counted if self.risk == "direct" else find_informative_samples("inconsistency", samples, moves)
+        )
+        if not shows.any():
             raise DataError(NO_DIRECTION)
         weights = np.ones(len(X)) if weights is None else weights
         model = self.place(X[counted], U.shape[1], weights[counted])
@@ -303,8 +311,10 @@ class Policy(RegressorMixin, BaseEstimator):
     def posterior(self) -> Posterior:
         """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
 
-        Each sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
-        more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
+        With the adaptive risk the noise is that which was inferred, for as many samples as are independent. With the
+        others it is estimated: each sample is taken to show one number, or d where nothing is projected. One whose
+        projection is known may show more, which moments do not count; the noise is then overestimated, and deviations
+        err on the side of caution.
 
         Returns
         -------
@@ -317,8 +327,11 @@ class Policy(RegressorMixin, BaseEstimator):
             The policy was saved without its sums.
         """
         moments = self.resume().moments()
-        numbers = self.n_actions_ if self.risk == "direct" else 1
-        return Posterior.of(moments, numbers, self.model_.decay(moments))
+        decay = self.model_.decay(moments)
+        belief = self.solution_.belief
+        if belief is not None:
+            return Posterior.of(moments, decay=decay, noise=belief.noise.across / belief.evidence)
+        return Posterior.of(moments, self.n_actions_ if self.risk == "direct" else 1, decay)
 
     def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:
         """Compute how far the true policy may be from `predict`.
@@ -340,10 +353,75 @@ class Policy(RegressorMixin, BaseEstimator):
         actions = self.model_.evaluate(X, self.solution_.w)
         return self.model_.covariance(X, actions, self.posterior() if posterior is None else posterior)
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-        """Compute the share of observed motion explained, `1 - Σ (r - û·π(x))² / Σ r²`.
+    def free_probability(
+        self,
+        X: ArrayLike | Demonstrations,
+        y: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+        projections: ArrayLike | None = None,
+    ) -> np.ndarray:
+        """Compute how surely nothing was in the way of each sample, by what this policy has learnt.
 
-        It does not depend on the risk that the policy was fitted with.
+        Parameters
+        ----------
+        X : array_like of shape (N, n), or Demonstrations
+            States, in the order of time within each episode.
+        y : array_like of shape (N, d) or (N,)
+            Actions.
+        groups : array_like of shape (N,), optional
+            Episode labels; without them each sample is judged by itself.
+        projections : array_like of shape (N, d, d), optional
+            The nullspace projections that are known, all NaN where one is not.
+
+        Returns
+        -------
+        ndarray of shape (N,)
+            Probabilities; 0 or 1 where the projection is known.
+
+        Raises
+        ------
+        DataError
+            Arrays are not finite or do not fit together.
+        PolicyError
+            The policy was learnt by another risk than the adaptive one.
+        """
+        check_is_fitted(self)
+        belief = self._belief("free_probability")
+        samples, _ = check_input(copy(self), X, y, groups, None, projections, first=False)
+        return infer(self.model_, belief, samples).free
+
+    def observe(self, samples: Samples) -> Observation:
+        """Say what samples show of the policy: as inferred, or else along their motion.
+
+        Parameters
+        ----------
+        samples : Samples
+            Checked.
+
+        Returns
+        -------
+        Observation
+            Of N samples.
+        """
+        belief = self.solution_.belief
+        if belief is not None:
+            return infer(self.model_, belief, samples).expand()
+        return observe("inconsistency", samples.actions, samples.projections)
+
+    def score(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+    ) -> float:
+        """Compute the share of what recordings show that the policy explains.
+
+        `1 - Σ [γ ‖u - p‖² + (1 - γ) (r - ûᵀp)²] / Σ ‖u‖²`: the whole action counts where nothing was in the way, and
+        what lies along the motion elsewhere. γ is the inferred probability with the adaptive risk; with "direct" all
+        samples are taken as free, with "inconsistency" none.
 
         Parameters
         ----------
@@ -353,6 +431,8 @@ class Policy(RegressorMixin, BaseEstimator):
             Actions.
         sample_weight : array_like of shape (N,), optional
             Weight of each sample, 1 by default.
+        groups : array_like of shape (N,), optional
+            Episode labels, along which contact is inferred; without them each sample is judged by itself.
 
         Returns
         -------
@@ -366,10 +446,14 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         U = check_actions(y)
         P = check_actions(self.predict(X), "predictions")
+        if self.solution_.belief is not None:
+            free = self.free_probability(X, y, groups=groups)
+        else:
+            free = np.full(len(U), float(self.risk == "direct"))
         if sample_weight is not None:
             root = np.sqrt(check_weights(sample_weight, U))[:, None]
             U, P = U * root, P * root
-        return metrics.explained(U, P)
+        return metrics.explained(U, P, free)
 
     def rollout(
         self,
@@ -530,6 +614,39 @@ class Policy(RegressorMixin, BaseEstimator):
         return _where_chosen(self.solution_.held_out_risk, "held_out_risk_")
 
     @property
+    def noise_(self) -> float:
+        """Standard deviation σ of the recorded actions about what policy and constraints say, in their unit."""
+        return float(np.sqrt(self._belief("noise_").noise.action))
+
+    @property
+    def speed_noise_(self) -> float:
+        """Standard deviation τ of the speed, as a share of the policy; 0 where that explains nothing more."""
+        return float(np.sqrt(self._belief("speed_noise_").noise.speed))
+
+    @property
+    def free_share_(self) -> float:
+        """Share of the samples learnt from in whose way nothing was, as inferred or known."""
+        self._belief("free_share_")
+        return self.solution_.free_share
+
+    @property
+    def log_likelihood_(self) -> float:
+        """Log-likelihood of a sample, held out with `alpha="cv"`; `log_likelihoods_` has others to compare it with."""
+        return next(iter(self.log_likelihoods_.values()))
+
+    @property
+    def log_likelihoods_(self) -> dict[str, float]:
+        """Log-likelihoods by what was assumed: what was chosen, then "all free", "all constrained" and others."""
+        self._belief("log_likelihoods_")
+        return dict(self.solution_.record.log_likelihoods)
+
+    @property
+    def history_(self) -> list[dict[str, Any]]:
+        """What each pass found: of which run it was, log-likelihood of a sample, noise, share of free samples."""
+        self._belief("history_")
+        return list(self.solution_.record.history)
+
+    @property
     def n_samples_seen_(self) -> int:
         """How many samples the policy has learnt from, including those without motion."""
         return self.solution_.n_samples
@@ -557,6 +674,13 @@ class Policy(RegressorMixin, BaseEstimator):
 
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
+
+    def _belief(self, name: str) -> Belief:
+        belief = self.solution_.belief
+        if belief is None:
+            message = f'{name} is there only after a fit with risk="adaptive"'
+            raise PolicyError(message) if name == "free_probability" else AttributeError(message)
+        return belief
 
     def _adopt_from(self, fresh: Self, accumulator: Accumulator, scalars: bool) -> Self:
         """Become the policy that was prepared on a copy. Nothing here changes before all of it has succeeded."""

@@ -108,7 +108,7 @@ def check_input(
     if projections is not None:
         if policy.risk == "direct":
             raise PolicyError(
-                'projections= are for risk="inconsistency", and this policy has risk="direct", which looks at the '
+                'projections= are for the other risks, and this policy has risk="direct", which looks at the '
                 "whole action"
             )
         projections = check_projections(projections, *U.shape, unknown=True)

@@ -38,7 +38,7 @@ class LocallyLinearPolicy(Policy):
         Every sample has a weight of at least this in some model; with a width given it sets their number.
     n_centers : int
         How many models, where neither a width nor the centres themselves say so.
-    risk : {"inconsistency", "direct"}
+    risk : {"adaptive", "inconsistency", "direct"}
         As for `ParametricPolicy`.
     alpha : "cv" or float
         As for `ParametricPolicy`; one λ for all models.
@@ -59,7 +59,8 @@ class LocallyLinearPolicy(Policy):
         Slopes of linear models, in the states' units; not there for other features.
     intercept_ : ndarray of shape (M, d)
         Offsets of linear models, at the states' origin.
-    alpha_, alphas_, held_out_risk_, n_samples_seen_, n_zero_actions_, n_known_constraints_
+    alpha_, alphas_, held_out_risk_, n_samples_seen_, n_zero_actions_, n_known_constraints_, noise_, speed_noise_,
+    free_share_, log_likelihood_, log_likelihoods_, history_
         As for `ParametricPolicy`.
     """
 
@@ -71,7 +72,7 @@ class LocallyLinearPolicy(Policy):
         centers: Any = "coverage",
         coverage: float = 0.7,
         n_centers: int = 30,
-        risk: str = "inconsistency",
+        risk: str = "adaptive",
         alpha: float | str = "cv",
         prior: str = "global",
         random_state: int | None = 0,

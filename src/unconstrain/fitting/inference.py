@@ -59,8 +59,8 @@ INDEPENDENT = 0.5
 NOTICEABLE = 0.1
 """Gain in held-out log-likelihood, per independent sample, for which another run is preferred."""
 
-SHORT_RUN = 12
-"""Passes of the runs that start where another ended."""
+SHORT_RUN, SHORTEST_RUN = 8, 2
+"""Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
 
 
 @dataclass
@@ -231,7 +231,7 @@ class Inference:
             self.stage = "inconsistency"
         elif self.stage == "inconsistency":
             self._start(done, CONSTRAINED)
-            self._run(FREE, self.starts[FREE], held="free", most=SHORT_RUN, cooling=False)
+            self._run(FREE, self.starts[FREE], held="free", most=SHORTEST_RUN, cooling=False)
             self.stage = "run"
         elif self.stage == "run":
             self._advance(done)
@@ -314,7 +314,7 @@ class Inference:
         elif FROM_INCONSISTENCY not in names:
             self._run(FROM_INCONSISTENCY, self.starts[CONSTRAINED])
         elif not self.likelihoods:
-            self._begin_comparison(self.runs[1:])
+            self._begin_comparison(self.runs)
         elif (
             SPEED not in names and self.blank.model.n_actions > 1 and self._likeliest().evidence > INDEPENDENT
         ):
@@ -326,7 +326,7 @@ class Inference:
             self._run(CONSTRAINED, self._best, held="constrained", most=SHORT_RUN, cooling=False)
             self.stage = "run"
         else:
-            self._begin_comparison(self.runs)
+            self._begin_comparison([run for run in self.runs if run.name not in self.likelihoods])
 
     @property
     def _best(self) -> Belief:
@@ -340,7 +340,8 @@ class Inference:
         """Choose the run whose likelihood is larger by more than `NOTICEABLE` than those of all before it."""
         ranks = {name: rank for rank, name in enumerate((FREE, FROM_DIRECT, FROM_INCONSISTENCY, SPEED))}
         best, *others = sorted(
-            (run for run in self.compared if run.name in ranks), key=lambda run: ranks[run.name]
+            (run for run in self.runs if run.name in ranks and run.name in self.likelihoods),
+            key=lambda run: ranks[run.name],
         )
         for run in others:
             gain = self.likelihoods[run.name] - self.likelihoods[best.name]
@@ -360,8 +361,8 @@ class Inference:
             self.noises = [replace(noise, action=max(noise.action, self._floor)) for noise in found]
             self.stage = "likelihood"
             return
-        self.likelihoods = {run.name: tally.log_likelihood / tally.n_samples for run, tally in results}
-        if len(self.compared) < len(self.runs):
+        self.likelihoods |= {run.name: tally.log_likelihood / tally.n_samples for run, tally in results}
+        if CONSTRAINED not in self.likelihoods:
             self._next_run()
             return
         best = self._likeliest()

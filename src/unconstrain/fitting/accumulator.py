@@ -53,6 +53,8 @@ class Solution:
         What was inferred of contact and noise, with these parameters.
     free_share : float
         Share of samples that were free, as inferred.
+    evidence : float
+        How many independent samples one is worth, by its residuals.
     record : Record
         How that was found.
     """
@@ -66,6 +68,7 @@ class Solution:
     n_known: int = 0
     belief: Belief | None = None
     free_share: float = math.nan
+    evidence: float = 1.0
     record: "Record" = field(default_factory=lambda: Record())
 
 
@@ -374,6 +377,7 @@ class Accumulator:
             solution,
             belief=replace(self.belief, w=parameters),
             free_share=float(states[0] / states.sum()),
+            evidence=total.tallies[0].evidence,
             record=self.record,
         )
 

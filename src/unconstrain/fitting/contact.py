@@ -12,10 +12,6 @@ with the exact gradients, and informations in place of curvatures: n is the grad
 So a fit is again a sum of moments, `H = Σ Φᵀ A Φ` and `Σ Φᵀ (A p + g)`, and repeating it is expectation
 maximisation, each maximisation one step of Fisher scoring.
 
-Residuals of a model that does not quite fit change slowly along an episode, and a hundred samples then tell no more
-than one. So log-likelihoods count as much as there are independent samples, `(1 - φ) / (1 + φ)` of them for residuals
-of correlation φ from one sample to the next.
-
 References
 ----------
 Dempster, Laird, Rubin, Maximum likelihood from incomplete data via the EM algorithm, J. R. Stat. Soc. B 39, 1977.
@@ -57,8 +53,6 @@ class Belief:
         Probabilities of being free.
     drift : Drift, optional
         How constrained samples follow each other on the sphere; without one each may be anywhere.
-    evidence : float
-        How many independent samples a sample is worth, at most 1.
     held : {"free", "constrained"}, optional
         What all samples are taken for that are not known to be otherwise.
     """
@@ -67,7 +61,6 @@ class Belief:
     noise: Noise
     chain: Chain = field(default_factory=Chain)
     drift: Drift | None = None
-    evidence: float = 1.0
     held: str | None = None
 
 
@@ -114,7 +107,7 @@ class Tally:
 
     @property
     def evidence(self) -> float:
-        """How many independent samples a sample is worth."""
+        """How many independent samples one is worth: `(1 - φ) / (1 + φ)` for residuals of correlation φ in a row."""
         correlation = np.clip(self.echo / self.energy, 0.0, MOST_CORRELATED) if self.energy > 0 else 0.0
         return float((1 - correlation) / (1 + correlation))
 
@@ -242,11 +235,11 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
     if belief.drift is not None and d > 1 and not starts.all():
         steps = Steps.of(views.sphere, views.constrained.variance, starts, belief.drift)
     free, log_likelihood, counts, kept = smooth(
-        belief.evidence * log_free,
-        belief.evidence * log_bent,
+        log_free,
+        log_bent,
         starts,
         belief.chain,
-        None if steps is None else belief.evidence * steps.log_kept,
+        None if steps is None else steps.log_kept,
     )
     taken = np.where(known, 1.0, free)
     omega = np.ones(N) if samples.weights is None else samples.weights

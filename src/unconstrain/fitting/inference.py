@@ -32,14 +32,14 @@ COOLING = 0.8
 """By what the noise's deviation is lowered from one pass to the next, at most."""
 
 MOST_PASSES, SETTLING = 60, 4
-"""Passes of a run at most, and those after the noise is found until which evidence is still adjusted."""
+"""Passes of a run at most, and those after the noise is found until which λ is still adjusted."""
 
 PASSES_PER_CHOICE = 5
-"""After so many passes λ is chosen anew, until the evidence is fixed."""
+"""After so many passes λ is chosen anew, until it is fixed."""
 
 HALVINGS = 5
 ENOUGH = 1e-4
-"""Gain in log-likelihood, per independent sample, that is not worth another pass."""
+"""Gain in log-likelihood, per sample, that is not worth another pass."""
 
 LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 """Deviation of the noise, as a share of the root mean square action; where speeds vary as well, a smaller one would let
@@ -57,7 +57,8 @@ INDEPENDENT = 0.5
 """Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
 
 NOTICEABLE = 0.1
-"""Gain in held-out log-likelihood, per independent sample, for which another run is preferred."""
+"""Gain in held-out log-likelihood, per independent sample, for which contact is taken to be there. Residuals of a model
+that does not quite fit change slowly along an episode, and a hundred samples then tell no more than one."""
 
 SHORT_RUN, SHORTEST_RUN = 8, 2
 """Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
@@ -103,7 +104,7 @@ class Run:
 
     @property
     def is_climbing(self) -> bool:
-        """Whether likelihoods of passes can be compared: evidence, and what decays, stay as they are."""
+        """Whether likelihoods of passes can be compared, since λ and how noise is lowered stay as they are."""
         return not self.cooling and self.since_cool >= SETTLING
 
     def take(self, done: Accumulator, floor: float) -> None:
@@ -123,7 +124,7 @@ class Run:
             if gain < 0:
                 self._halve()
                 return
-            self.is_done = gain < ENOUGH * self.belief.evidence * tally.n_samples
+            self.is_done = gain < ENOUGH * tally.n_samples
         self.accepted, self.log_likelihood, self.halvings = done, tally.log_likelihood, 0
         if self.passes >= self.most:
             self.is_done = True
@@ -163,7 +164,6 @@ class Run:
             noise=noise,
             chain=belief.chain if belief.held else tally.counts.chain(),
             drift=None if belief.drift is None else tally.drifts.estimate(),
-            evidence=belief.evidence if self.is_climbing else tally.evidence,
         )
 
 
@@ -299,7 +299,7 @@ class Inference:
                 "noise": float(np.sqrt(done.belief.noise.action)),
                 "speed_noise": float(np.sqrt(done.belief.noise.speed)),
                 "free_share": float(tally.counts.states[0] / tally.counts.states.sum()),
-                "evidence": done.belief.evidence,
+                "evidence": tally.evidence,
                 "alpha": run.alpha,
             }
         )
@@ -337,17 +337,21 @@ class Inference:
         return accepted.belief
 
     def _likeliest(self) -> Run:
-        """Choose the run whose likelihood is larger by more than `NOTICEABLE` than those of all before it."""
-        ranks = {name: rank for rank, name in enumerate((FREE, FROM_DIRECT, FROM_INCONSISTENCY, SPEED))}
-        best, *others = sorted(
-            (run for run in self.runs if run.name in ranks and run.name in self.likelihoods),
-            key=lambda run: ranks[run.name],
-        )
-        for run in others:
-            gain = self.likelihoods[run.name] - self.likelihoods[best.name]
-            if gain * min(run.evidence, best.evidence) > NOTICEABLE:
-                best = run
-        return best
+        """Choose the run of the largest likelihood among those that clearly beat "all free", if any does."""
+        free = next(run for run in self.runs if run.name == FREE)
+        clear = [
+            run
+            for run in self.runs
+            if run.name in self.likelihoods
+            and run.name not in (FREE, CONSTRAINED)
+            and self._gain(run, free) > NOTICEABLE
+        ]
+        return max(clear, key=lambda run: self.likelihoods[run.name], default=free)
+
+    def _gain(self, run: Run, other: Run) -> float:
+        """Compute by how much a run is likelier, per independent sample."""
+        gain = self.likelihoods[run.name] - self.likelihoods[other.name]
+        return gain * min(run.evidence, other.evidence)
 
     def _begin_comparison(self, runs: list[Run]) -> None:
         self.compared = list(runs)
@@ -399,7 +403,7 @@ def _held_out_beliefs(run: Run, noise: Noise) -> tuple[Belief, ...]:
     accepted = run.accepted
     assert accepted is not None
     assert accepted.belief is not None
-    plain = replace(accepted.belief, noise=noise, evidence=1.0)
+    plain = replace(accepted.belief, noise=noise)
     present = [k for k, part in enumerate(accepted.total.moments) if part is not None]
     if accepted.folds is None or len(present) < 2:
         return (plain,)

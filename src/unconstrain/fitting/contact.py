@@ -233,7 +233,9 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
     starts = episode_starts(samples)
     steps = None
     if belief.drift is not None and d > 1 and not starts.all():
-        steps = Steps.of(views.sphere, views.constrained.variance, starts, belief.drift)
+        # Across the sphere there is no noise of speed.
+        across = belief.noise.action + views.sphere.share * belief.noise.misfit
+        steps = Steps.of(views.sphere, across, starts, belief.drift)
     free, log_likelihood, counts, kept = smooth(
         log_free,
         log_bent,

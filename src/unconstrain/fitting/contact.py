@@ -82,6 +82,8 @@ class Tally:
         `Σ e_t · e_{t-1}` of residuals in units of their deviation, and
     energy : float
         `Σ (e_t² + e_{t-1}²) / 2`.
+    shown, meant : float
+        Sums of squared lengths, of actions and of predictions.
     n_samples : int
         How many.
     """
@@ -92,6 +94,8 @@ class Tally:
     drifts: Drifts
     echo: float
     energy: float
+    shown: float
+    meant: float
     n_samples: int
 
     def __add__(self, other: "Tally") -> "Tally":
@@ -102,6 +106,8 @@ class Tally:
             self.drifts + other.drifts,
             self.echo + other.echo,
             self.energy + other.energy,
+            self.shown + other.shown,
+            self.meant + other.meant,
             self.n_samples + other.n_samples,
         )
 
@@ -251,6 +257,8 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
         _squares(views, taken, omega),
         Drifts() if steps is None else steps.sum(kept),
         *_echo(views, taken, starts),
+        float(np.sum(U**2)),
+        float(np.sum(P**2)),
         N,
     )
     return Found(views, free, taken, known, rows, tally)

@@ -56,9 +56,13 @@ FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, SPEED = (
 INDEPENDENT = 0.5
 """Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
 
-NOTICEABLE = 0.1
+NOTICEABLE = 0.015
 """Gain in held-out log-likelihood, per independent sample, for which contact is taken to be there. Residuals of a model
 that does not quite fit change slowly along an episode, and a hundred samples then tell no more than one."""
+
+LARGEST_POLICY = 2.0
+"""How many times √d larger than what is recorded a policy may be. Of a large enough one anything is left: near the
+origin its sphere passes by every action. Were but one direction left to move in, √d would be about right."""
 
 SHORT_RUN, SHORTEST_RUN = 8, 2
 """Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
@@ -101,6 +105,19 @@ class Run:
         """How many independent samples a sample is worth where the run ended."""
         assert self.accepted is not None
         return self.accepted.total.tallies[0].evidence
+
+    @property
+    def size(self) -> float:
+        """How many times larger the policy is than what is recorded, root mean square."""
+        assert self.accepted is not None
+        (tally,) = self.accepted.total.tallies
+        return float(np.sqrt(tally.meant / tally.shown)) if tally.shown > 0 else 0.0
+
+    @property
+    def chooses_alpha(self) -> bool:
+        """Whether λ is chosen with the next pass; runs that start where another ended take that one's."""
+        begins_anew = self.most != SHORT_RUN
+        return begins_anew and not self.is_climbing and self.passes % PASSES_PER_CHOICE == 0
 
     @property
     def is_climbing(self) -> bool:
@@ -204,9 +221,7 @@ class Inference:
         if self.stage == "run":
             run = self.runs[-1]
             wanted = self._blank("adaptive", run.belief)
-            wanted.is_judged = (
-                self.blank.alpha == "cv" and not run.is_climbing and run.passes % PASSES_PER_CHOICE == 0
-            )
+            wanted.is_judged = self.blank.alpha == "cv" and run.chooses_alpha
             return wanted
         if self.stage == "final":
             accepted = self.compared[0].accepted
@@ -319,11 +334,12 @@ class Inference:
             SPEED not in names and self.blank.model.n_actions > 1 and self._likeliest().evidence > INDEPENDENT
         ):
             noise = replace(self._best.noise, speed=SPEED_AT_FIRST)
-            start = replace(self._best, noise=noise)
-            self._run(SPEED, start, kinds=("action", "speed"), most=SHORT_RUN, cooling=False)
+            start, alpha = replace(self._best, noise=noise), self._likeliest().alpha
+            self._run(SPEED, start, kinds=("action", "speed"), most=SHORT_RUN, cooling=False, alpha=alpha)
             self.stage = "run"
         elif CONSTRAINED not in names:
-            self._run(CONSTRAINED, self._best, held="constrained", most=SHORT_RUN, cooling=False)
+            alpha = self._likeliest().alpha
+            self._run(CONSTRAINED, self._best, held="constrained", most=SHORT_RUN, cooling=False, alpha=alpha)
             self.stage = "run"
         else:
             self._begin_comparison([run for run in self.runs if run.name not in self.likelihoods])
@@ -337,21 +353,24 @@ class Inference:
         return accepted.belief
 
     def _likeliest(self) -> Run:
-        """Choose the run of the largest likelihood among those that clearly beat "all free", if any does."""
-        free = next(run for run in self.runs if run.name == FREE)
-        clear = [
-            run
-            for run in self.runs
-            if run.name in self.likelihoods
-            and run.name not in (FREE, CONSTRAINED)
-            and self._gain(run, free) > NOTICEABLE
-        ]
-        return max(clear, key=lambda run: self.likelihoods[run.name], default=free)
+        """Choose the run that beats "all free" most clearly, "all free" itself if none does.
 
-    def _gain(self, run: Run, other: Run) -> float:
-        """Compute by how much a run is likelier, per independent sample."""
-        gain = self.likelihoods[run.name] - self.likelihoods[other.name]
-        return gain * min(run.evidence, other.evidence)
+        One that makes the policy implausibly large does not count, and one with more kinds of noise has to beat those
+        with fewer as clearly.
+        """
+        runs = {run.name: run for run in self.runs if run.name in self.likelihoods}
+        largest = LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)
+
+        def clearest(names: tuple[str, ...], best: Run) -> Run:
+            gains = {
+                name: (self.likelihoods[name] - self.likelihoods[best.name]) * runs[name].evidence
+                for name in names
+                if name in runs and runs[name].size <= largest
+            }
+            clear = [name for name, gain in gains.items() if gain > NOTICEABLE]
+            return runs[max(clear, key=lambda name: gains[name])] if clear else best
+
+        return clearest((SPEED,), clearest((FROM_DIRECT, FROM_INCONSISTENCY), runs[FREE]))
 
     def _begin_comparison(self, runs: list[Run]) -> None:
         self.compared = list(runs)

@@ -32,8 +32,8 @@ def test_a_policy_can_be_chosen_first():
     found = compare_risks(None, *DATA, progress=lambda row: seen.append(row.name))
     assert found.chosen is not None
     assert seen[-2:] == ["inconsistency", "direct"]
-    assert found.chosen[next(iter(found.chosen)).name].inconsistency == pytest.approx(
-        found.kept.inconsistency
+    assert found.chosen[next(iter(found.chosen)).name].error == pytest.approx(
+        found.kept.error
     )
 
 

@@ -147,7 +147,7 @@ def run_auto(p: float, constraint: str, seed: int, episodes: int = EPISODES) -> 
     result: dict[str, Any] = {"chosen": found.name}
     for name, policy in found.policies.items():
         result |= {f"{name} {error}": value for error, value in measure_errors(policy, recordings).items()}
-        result[f"{name} inconsistency"] = found.table[name].inconsistency
+        result[f"{name} inconsistency"] = found.table[name].error
         result[f"{name} seconds"] = found.table[name].seconds
     return result
 

@@ -132,7 +132,9 @@ def make_candidates() -> dict[str, Policy]:
         "splines": ParametricPolicy(splines, risk="inconsistency", alpha="cv"),
         "decoupled, 15 knots": ParametricPolicy(DecoupledFeatures(15), risk="inconsistency", alpha="cv"),
         "decoupled, 31 knots": ParametricPolicy(DecoupledFeatures(31), risk="inconsistency", alpha="cv"),
-        "potential": ParametricPolicy(PotentialFeatures(NormalizedRBF(100)), risk="inconsistency", alpha="cv"),
+        "potential": ParametricPolicy(
+            PotentialFeatures(NormalizedRBF(100)), risk="inconsistency", alpha="cv"
+        ),
     }
 
 

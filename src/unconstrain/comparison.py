@@ -1,7 +1,7 @@
 """How much better a policy predicts held-out recordings than the same model fitted with another risk.
 
-All risks are fitted to the same samples and judged on the same held-out episodes by the same measure, that of what these
-samples show as inferred by the adaptive one (`judging`).
+All risks are fitted to the same samples and judged on the same held-out episodes by the same measure, that of what
+these samples show as inferred by the adaptive one (`judging`).
 """
 
 from collections.abc import Callable
@@ -52,7 +52,7 @@ class Comparison:
 
     @property
     def better(self) -> str | None:
-        """The risk whose held-out error is surely lower than the policy's, and the least such; None if there is none."""
+        """The risk of least held-out error among those that are surely better than the policy's own, if there are."""
         beaten_by = [
             risk for risk, row in self.rows.items() if row is not self.kept and _is_better(row, self.kept)
         ]

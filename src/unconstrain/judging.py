@@ -1,7 +1,7 @@
 """By what candidates are compared on episodes that none of them has learnt from: one measure for all of them.
 
-Which samples were free decides what a recording shows of a policy, so candidates are compared by one belief in that, not
-each by its own. With the probability γ that a sample was free, its action u and a held-out prediction p, the error is
+Which samples were free decides what a recording shows of a policy, so candidates are compared by one belief in that,
+not each by its own. With the probability γ that a sample was free, its action u and a held-out prediction p, the error is
 
     γ ‖u - p‖² + (1 - γ) (uᵀ(u - p))² / s,        s = mean ‖u‖²,
 
@@ -95,7 +95,9 @@ class Judge:
 
     def _corrected(self, U: np.ndarray, P: np.ndarray, v: float) -> np.ndarray:
         d, y, up = U.shape[1], _squares(U), np.einsum("nd,nd->n", U, P)
-        error = (y - up) ** 2 - (2 * d + 4) * v * y + d * (d + 2) * v**2 + 2 * (d + 2) * v * up - v * _squares(P)
+        error = (
+            (y - up) ** 2 - (2 * d + 4) * v * y + d * (d + 2) * v**2 + 2 * (d + 2) * v * up - v * _squares(P)
+        )
         # What noise adds whatever the prediction is stays, so that small differences are seen beside it.
         return (error + v * y) / np.mean(y)
 

@@ -206,10 +206,11 @@ def select_policy(
 ) -> Selection:
     """Choose the candidate with the least error on held-out episodes, and fit it to all the data.
 
-    The error is that of what held-out samples show: of the whole action as far as a sample was free, of what lies along
-    the motion otherwise. Which samples were free is inferred, by the likeliest candidate with the risk "adaptive"; where
-    there is none, and risks differ, by one made of the candidate that is least inconsistent. Candidates that all have
-    the risk "inconsistency" are judged by their inconsistency, and those that all have "direct" by whole actions.
+    The error is that of what held-out samples show: of the whole action as far as a sample was free, of what lies
+    along the motion otherwise. Which samples were free is inferred, by the likeliest candidate with the risk
+    "adaptive"; where there is none, and risks differ, by one made of the candidate that is least inconsistent.
+    Candidates that all have the risk "inconsistency" are judged by their inconsistency, and those that all have
+    "direct" by whole actions.
 
     Parameters
     ----------

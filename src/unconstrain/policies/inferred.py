@@ -1,11 +1,16 @@
 """What a policy has inferred of its recordings, in sentences."""
 
-from unconstrain.fitting.inference import CONSTRAINED, FREE
+from unconstrain.fitting.inference import CONSTRAINED, FREE, NOTICEABLE
 from unconstrain.policies.base import Policy
 
 NOTHING_FOUND = "no contact was found in these recordings, so this is ordinary regression"
 NOTHING_MORE_FOUND = (
-    "beyond the constraints that are known no contact was found in these recordings: all other samples count as free"
+    "beyond the constraints that are known no contact was found in these recordings: "
+    "other samples count as free"
+)
+IN_DOUBT = (
+    "warning: no contact could be told from what the model itself misses, so all samples count as free; but some of "
+    "them look constrained, so try a finer model (more centres, another width or another kind), which can tell"
 )
 
 
@@ -39,5 +44,9 @@ def describe_inferred(policy: Policy) -> str:
             f"log-likelihood of a {held_out}sample: {policy.log_likelihood_:.4g} as inferred, {', '.join(others)}"
         )
         if chosen == FREE:
-            lines.append(NOTHING_MORE_FOUND if policy.n_known_constraints_ else NOTHING_FOUND)
+            # Constraints on every sample explain anything, so their likelihood is no ground for doubt.
+            rivals = [value for name, value in likelihoods.items() if name != CONSTRAINED]
+            is_in_doubt = max(rivals) - likelihoods[FREE] > NOTICEABLE
+            found = NOTHING_MORE_FOUND if policy.n_known_constraints_ else NOTHING_FOUND
+            lines.append(IN_DOUBT if is_in_doubt else found)
     return "\n".join(lines)

@@ -19,8 +19,9 @@ from unconstrain.selection import Row, Table, select_policy
 NOTICEABLE = 0.01
 """A held-out error that is lower by less than this share is called no better: rounding reaches so far."""
 
-SURE = 2.0
-"""Standard errors, over folds, by which it must be lower too: in a fold or two anything may happen."""
+SURE, MUCH = 2.0, 0.5
+"""Standard errors, over folds, by which it must be lower too, as in a fold or two anything may happen; unless it is
+lower by this share."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,8 @@ class Comparison:
 def _is_better(one: Row, other: Row) -> bool:
     if one.problem is not None or not one.error < other.error - NOTICEABLE * abs(other.error):
         return False
+    if one.error < MUCH * other.error:
+        return True
     gains = np.subtract(other.by_fold, one.by_fold)
     return bool(gains.mean() > SURE * gains.std(ddof=1) / np.sqrt(len(gains)))
 

@@ -1,7 +1,8 @@
 """By what candidates are compared on episodes that none of them has learnt from: one measure for all.
 
 Which samples were free decides what a recording shows of a policy, so candidates are compared by one belief in that,
-not each by its own. With the probability γ that a sample was free, its action u and a held-out prediction p, the error is
+not each by its own. With the probability γ that a sample was free, its action u and a held-out prediction p, the
+error is
 
     γ ‖u - p‖² + (1 - γ) (uᵀ(u - p))² / s,        s = mean ‖u‖²,
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from unconstrain.errors import DataError
 from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief
@@ -40,6 +41,9 @@ PASSES_PER_CHOICE = 5
 HALVINGS = 5
 ENOUGH = 1e-4
 """Gain in log-likelihood, per independent sample, that is not worth another pass."""
+
+SMALLEST_SCALE, LARGEST_SCALE = 1e-120, 1e120
+"""Mean squares of the actions between which variances can be squared, and their inverses."""
 
 LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 """Deviation of the noise, as a share of the root mean square action; where speeds vary as well, a smaller one would let
@@ -269,10 +273,13 @@ class Inference:
         total, d = done.moments(), self.blank.model.n_actions
         if name == FREE:
             whole = total if total.everywhere is None else total.everywhere
-            self.scale = max(float(np.sum(whole.squares) / np.sum(whole.weight)), np.finfo(np.float64).tiny)
-            # Of local models each by itself.
-            left = solution.w
-            variance = _residual(done, left) / d
+            self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
+            if not SMALLEST_SCALE < self.scale < LARGEST_SCALE:
+                raise DataError(
+                    f"the actions' root mean square is {np.sqrt(self.scale):.3g}, and powers of that which the "
+                    "adaptive risk needs are no numbers any more: give the actions in another unit"
+                )
+            variance = _residual(done, solution.w) / d
         else:
             variance = 0.25 * self.scale / d
         self.starts[name] = Belief(solution.w, Noise(max(variance, self._floor)))

@@ -26,7 +26,7 @@ def mean_over_sphere(d, kappa):
             t = x * x
             return 2 * x**power * np.exp(-kappa * t) * (2 - t) ** ((d - 3) / 2) * x ** (d - 3) * x
 
-        return quad(of, 0, np.sqrt(width), epsrel=1e-11, limit=500)[0]
+        return quad(of, 0, np.sqrt(width), epsabs=0, epsrel=1e-11, limit=500)[0]
 
     area = gammaln(d / 2) - gammaln((d - 1) / 2) - 0.5 * np.log(np.pi)
     return area + np.log(integral(0)), integral(2) / integral(0)
@@ -109,7 +109,8 @@ def test_the_marginal_is_what_simulated_actions_have():
         share = np.mean(np.all(np.abs(U - corner) < side / 2, axis=1))
         grid = corner + side * (np.stack(np.meshgrid(*2 * [np.linspace(-0.45, 0.45, 10)]), -1).reshape(-1, 2))
         density = np.exp(blurred(Sphere.of(grid, np.tile(p, (100, 1))), np.full(100, s**2)).log).mean()
-        assert share == pytest.approx(density * side**2, rel=0.1)
+        expected = density * side**2
+        assert abs(share - expected) < 5 * np.sqrt(expected / N) + 0.02 * expected
 
 
 @given(seeds, st.sampled_from([1, 2, 3, 7, 60]), st.floats(-2, 1))

@@ -23,8 +23,9 @@ NEVER = 1e-6
 CHANGES_BEFORE, STAYS_BEFORE = 1.0, 29.0
 # As if so many samples of either kind had been seen before.
 SAMPLES_BEFORE = 1.0
-MOST_TELLING = 600.0
-"""Log-likelihoods further apart than this are as good as certain, and their exponential is still a number."""
+MOST_TELLING = 200.0
+"""Log-likelihoods further apart than this are as good as certain, and a product of a few exponentials is still a
+number."""
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,8 @@ class Belief:
         How many independent samples a sample is worth, at most 1.
     held : {"free", "constrained"}, optional
         What all samples are taken for that are not known to be otherwise.
+    is_cooling : bool
+        Whether the noise is still being lowered, and so is larger than that of the samples.
     """
 
     w: Floats
@@ -66,6 +68,7 @@ class Belief:
     drift: Drift | None = None
     evidence: float = 1.0
     held: str | None = None
+    is_cooling: bool = False
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,7 @@ class Found(NamedTuple):
         parts = (free + blunt, along, towards, sphere.ahead, sphere.normal)
         return Expanded.of(views.P, gradient, error, *parts, known=self.known, projections=self.projections)
 
-    def judge(self, scale: float) -> Expanded:
+    def judge(self, scale: float, variance: float | None = None) -> Expanded:
         """Make the observation by which parameters are judged that were not learnt from these samples.
 
         It does not weigh samples by what is predicted, as likelihoods do, so that no prediction can make itself matter
@@ -173,6 +176,9 @@ class Found(NamedTuple):
         ----------
         scale : float
             Mean squared length of the actions.
+        variance : float, optional
+            Variance of the noise that it is corrected for; by default that of the belief. A variance larger than that
+            of the samples prefers policies that are too short, so an upper bound will not do.
 
         Returns
         -------
@@ -185,7 +191,7 @@ class Found(NamedTuple):
         Computational Statistics and Data Analysis 47, 2004.
         """
         U, free = self.views.U, self.taken_whole
-        d, v = U.shape[1], self.views.noise.across
+        d, v = U.shape[1], self.views.noise.across if variance is None else variance
         y = np.einsum("nd,nd->n", U, U)
         bent = (1 - free) / scale
         pulls = (free + bent * (y - (d + 2) * v))[:, None] * U

@@ -36,7 +36,7 @@ MOST_PASSES, SETTLING = 60, 4
 """Passes of a run at most, and those after the noise is found until which evidence is still adjusted."""
 
 PASSES_PER_CHOICE = 5
-"""After so many passes λ is chosen anew, until the evidence is fixed."""
+"""After so many passes λ is chosen anew, and once more when the evidence is fixed."""
 
 HALVINGS = 5
 ENOUGH = 1e-4
@@ -168,6 +168,7 @@ class Run:
             chain=belief.chain if belief.held else tally.counts.chain(),
             drift=None if belief.drift is None else tally.drifts.estimate(),
             evidence=belief.evidence if self.is_climbing else tally.evidence,
+            is_cooling=self.cooling,
         )
 
 
@@ -209,7 +210,9 @@ class Inference:
             run = self.runs[-1]
             wanted = self._blank("adaptive", run.belief)
             wanted.is_judged = (
-                self.blank.alpha == "cv" and not run.is_climbing and run.passes % PASSES_PER_CHOICE == 0
+                self.blank.alpha == "cv"
+                and not run.is_climbing
+                and (run.passes % PASSES_PER_CHOICE == 0 or run.since_cool == SETTLING - 1)
             )
             return wanted
         if self.stage == "final":
@@ -289,7 +292,8 @@ class Inference:
         drift = None if held == "free" or self.blank.model.n_actions == 1 else Drift()
         kinds = options.pop("kinds", ("action",))
         chain = Chain.held(held) if held else start.chain
-        belief = replace(start, held=held, drift=start.drift or drift, chain=chain)
+        cooling = options.get("cooling", True)
+        belief = replace(start, held=held, drift=start.drift or drift, chain=chain, is_cooling=cooling)
         self.runs.append(Run(name, kinds, belief, **options))
 
     def _advance(self, done: Accumulator) -> None:
@@ -351,7 +355,7 @@ class Inference:
         )
         for run in others:
             gain = self.likelihoods[run.name] - self.likelihoods[best.name]
-            if gain * min(run.evidence, best.evidence) > NOTICEABLE:
+            if gain * run.evidence > NOTICEABLE:
                 best = run
         return best
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from unconstrain.errors import DataError
 from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief
@@ -35,11 +36,14 @@ MOST_PASSES, SETTLING = 60, 4
 """Passes of a run at most, and those after the noise is found until which evidence is still adjusted."""
 
 PASSES_PER_CHOICE = 5
-"""After so many passes λ is chosen anew, until the evidence is fixed."""
+"""After so many passes λ is chosen anew, and once more when the evidence is fixed."""
 
 HALVINGS = 5
 ENOUGH = 1e-4
 """Gain in log-likelihood, per independent sample, that is not worth another pass."""
+
+SMALLEST_SCALE, LARGEST_SCALE = 1e-120, 1e120
+"""Mean squares of the actions between which variances can be squared, and their inverses."""
 
 LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 """Deviation of the noise, as a share of the root mean square action; where speeds vary as well, a smaller one would let
@@ -164,6 +168,7 @@ class Run:
             chain=belief.chain if belief.held else tally.counts.chain(),
             drift=None if belief.drift is None else tally.drifts.estimate(),
             evidence=belief.evidence if self.is_climbing else tally.evidence,
+            is_cooling=self.cooling,
         )
 
 
@@ -205,7 +210,9 @@ class Inference:
             run = self.runs[-1]
             wanted = self._blank("adaptive", run.belief)
             wanted.is_judged = (
-                self.blank.alpha == "cv" and not run.is_climbing and run.passes % PASSES_PER_CHOICE == 0
+                self.blank.alpha == "cv"
+                and not run.is_climbing
+                and (run.passes % PASSES_PER_CHOICE == 0 or run.since_cool == SETTLING - 1)
             )
             return wanted
         if self.stage == "final":
@@ -269,10 +276,13 @@ class Inference:
         total, d = done.moments(), self.blank.model.n_actions
         if name == FREE:
             whole = total if total.everywhere is None else total.everywhere
-            self.scale = max(float(np.sum(whole.squares) / np.sum(whole.weight)), np.finfo(np.float64).tiny)
-            # Of local models each by itself.
-            left = solution.w
-            variance = _residual(done, left) / d
+            self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
+            if not SMALLEST_SCALE < self.scale < LARGEST_SCALE:
+                raise DataError(
+                    f"the actions' root mean square is {np.sqrt(self.scale):.3g}, and powers of that which the "
+                    "adaptive risk needs are no numbers any more: give the actions in another unit"
+                )
+            variance = _residual(done, solution.w) / d
         else:
             variance = 0.25 * self.scale / d
         self.starts[name] = Belief(solution.w, Noise(max(variance, self._floor)))
@@ -282,7 +292,8 @@ class Inference:
         drift = None if held == "free" or self.blank.model.n_actions == 1 else Drift()
         kinds = options.pop("kinds", ("action",))
         chain = Chain.held(held) if held else start.chain
-        belief = replace(start, held=held, drift=start.drift or drift, chain=chain)
+        cooling = options.get("cooling", True)
+        belief = replace(start, held=held, drift=start.drift or drift, chain=chain, is_cooling=cooling)
         self.runs.append(Run(name, kinds, belief, **options))
 
     def _advance(self, done: Accumulator) -> None:
@@ -344,7 +355,7 @@ class Inference:
         )
         for run in others:
             gain = self.likelihoods[run.name] - self.likelihoods[best.name]
-            if gain * min(run.evidence, best.evidence) > NOTICEABLE:
+            if gain * run.evidence > NOTICEABLE:
                 best = run
         return best
 

@@ -2,39 +2,57 @@ import pytest
 
 import unconstrain as uc
 from unconstrain.comparison import compare_risks
-from unconstrain.demo import make_policy
+from unconstrain.demo import draw_recordings, make_policy
 from unconstrain.limit_cycle import demonstrate
 
 DEMOS = demonstrate(20, random_state=0)
 DATA = (DEMOS.states, DEMOS.actions, DEMOS.episodes)
-RBF = make_policy()
+RBF = make_policy("adaptive")
 
 
-def test_both_risks_are_judged_on_the_same_episodes():
+def test_all_risks_are_judged_on_the_same_episodes():
     found = compare_risks(RBF, *DATA)
-    assert found.policy.risk == "inconsistency"
+    assert found.policy.risk == "adaptive"
     assert not hasattr(RBF, "solution_")
-    assert list(found.by_risk()) == ["inconsistency", "direct"]
-    assert found.by_risk()["inconsistency"] is found.kept
-    assert found.kept.explained > 0.9 > found.other.explained
+    assert list(found.rows) == ["adaptive", "inconsistency", "direct"]
+    assert found.rows["adaptive"] is found.kept
+    assert found.kept.explained > 0.9 > found.rows["direct"].explained
+    assert found.better is None
     assert found.chosen is None
 
 
-def test_the_direct_policy_is_compared_with_the_other():
-    found = compare_risks(uc.ParametricPolicy(risk="direct"), *DATA)
-    assert (found.policy.risk, found.other_risk) == ("direct", "inconsistency")
-    assert list(found.by_risk()) == ["inconsistency", "direct"]
-    assert found.by_risk()["direct"] is found.kept
+def test_the_direct_policy_is_told_what_is_better():
+    found = compare_risks(make_policy("direct"), *DATA)
+    assert found.policy.risk == "direct"
+    assert found.kept is found.rows["direct"]
+    assert found.better in ("adaptive", "inconsistency")
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.3])
+@pytest.mark.parametrize("risk", ["direct", "inconsistency", "adaptive"])
+def test_where_all_is_free_and_noisy_nothing_is_better_than_ordinary_regression(risk, noise):
+    free = demonstrate(10, noise=noise, constrained=False, random_state=0)
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(), risk=risk)
+    found = compare_risks(policy, free.states, free.actions, free.episodes)
+    assert found.rows["adaptive"].error == pytest.approx(found.rows["direct"].error)
+    assert found.rows["inconsistency"].error > found.rows["direct"].error
+    assert found.better in ((None,) if risk != "inconsistency" else ("adaptive", "direct", None))
+
+
+def test_on_the_demos_data_nothing_is_better_than_what_was_inferred():
+    training, _ = draw_recordings(0)
+    found = compare_risks(make_policy("adaptive"), training.states, training.actions, training.episodes)
+    errors = {risk: row.error for risk, row in found.rows.items()}
+    assert errors["adaptive"] < errors["inconsistency"] < errors["direct"]
+    assert found.better is None
 
 
 def test_a_policy_can_be_chosen_first():
     seen = []
     found = compare_risks(None, *DATA, progress=lambda row: seen.append(row.name))
     assert found.chosen is not None
-    assert seen[-2:] == ["inconsistency", "direct"]
-    assert found.chosen[next(iter(found.chosen)).name].inconsistency == pytest.approx(
-        found.kept.inconsistency
-    )
+    assert seen[-3:] == ["adaptive", "inconsistency", "direct"]
+    assert found.chosen[next(iter(found.chosen)).name].error == pytest.approx(found.kept.error)
 
 
 def test_known_projections_are_used_and_judged_by():

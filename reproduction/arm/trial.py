@@ -128,11 +128,13 @@ def make_candidates() -> dict[str, Policy]:
     splines = SplineTransformer(n_knots=7, extrapolation="linear")
     return {
         "locally linear": make_local_models(),
-        "RBF": ParametricPolicy(NormalizedRBF(50, width=WIDTH), alpha="cv"),
-        "splines": ParametricPolicy(splines, alpha="cv"),
-        "decoupled, 15 knots": ParametricPolicy(DecoupledFeatures(15), alpha="cv"),
-        "decoupled, 31 knots": ParametricPolicy(DecoupledFeatures(31), alpha="cv"),
-        "potential": ParametricPolicy(PotentialFeatures(NormalizedRBF(100)), alpha="cv"),
+        "RBF": ParametricPolicy(NormalizedRBF(50, width=WIDTH), risk="inconsistency", alpha="cv"),
+        "splines": ParametricPolicy(splines, risk="inconsistency", alpha="cv"),
+        "decoupled, 15 knots": ParametricPolicy(DecoupledFeatures(15), risk="inconsistency", alpha="cv"),
+        "decoupled, 31 knots": ParametricPolicy(DecoupledFeatures(31), risk="inconsistency", alpha="cv"),
+        "potential": ParametricPolicy(
+            PotentialFeatures(NormalizedRBF(100)), risk="inconsistency", alpha="cv"
+        ),
     }
 
 
@@ -147,7 +149,7 @@ def run_auto(p: float, constraint: str, seed: int, episodes: int = EPISODES) -> 
     result: dict[str, Any] = {"chosen": found.name}
     for name, policy in found.policies.items():
         result |= {f"{name} {error}": value for error, value in measure_errors(policy, recordings).items()}
-        result[f"{name} inconsistency"] = found.table[name].inconsistency
+        result[f"{name} inconsistency"] = found.table[name].error
         result[f"{name} seconds"] = found.table[name].seconds
     return result
 

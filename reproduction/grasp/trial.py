@@ -73,7 +73,8 @@ def make_model(risk: str, name: str = "local") -> Policy | dict[str, Policy]:
     if name == "potential":
         return potential
     if name == "auto":
-        return {**candidates(6, 6), "150 local models": local, "quartic potential": potential}
+        named = {each: policy.set_params(risk=risk) for each, policy in candidates(6, 6).items()}
+        return {**named, "150 local models": local, "quartic potential": potential}
     raise UnconstrainError(f"there is no model {name!r} for the grasp: choose local, potential or auto")
 
 

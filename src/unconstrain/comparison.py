@@ -1,59 +1,72 @@
 """How much better a policy predicts held-out recordings than the same model fitted with another risk.
 
-Ordinary regression, the risk "direct", is what a policy learnt by inconsistency is to be compared with, and the other
-way round: both are fitted to the same samples and judged on the same held-out episodes by the same measure.
+All risks are fitted to the same samples and judged on the same held-out episodes by the same measure, that of what
+these samples show as inferred by the adaptive one (`judging`).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from unconstrain.errors import PolicyError
+from unconstrain.fitting.observation import RISKS
 from unconstrain.policies.base import Policy
 from unconstrain.selection import Row, Table, select_policy
 
 NOTICEABLE = 0.01
 """A held-out error that is lower by less than this share is called no better: rounding reaches so far."""
 
+SURE, MUCH = 2.0, 0.5
+"""Standard errors, over folds, by which it must be lower too, as in a fold or two anything may happen; unless it is
+lower by this share."""
+
 
 @dataclass(frozen=True)
 class Comparison:
-    """A policy, fitted, beside its model with the other risk.
+    """A policy, fitted, beside its model with the other risks.
 
     Attributes
     ----------
     policy : Policy
         Fitted to all samples.
-    kept : Row
-        How well it predicts held-out samples.
-    other : Row
-        How well its model with the other risk does; its `problem` says so if that could not be fitted.
-    other_risk : str
-        "direct", or "inconsistency" where the policy's own risk is "direct".
+    rows : dict of str to Row
+        How well each risk predicts held-out samples, ordinary regression last; a row's `problem` says so if its risk
+        could not be fitted.
     measure : str
-        What both are judged by, in words.
+        What all are judged by, in words.
     chosen : Table or None
         How the policy was chosen, if it was.
     """
 
     policy: Policy
-    kept: Row
-    other: Row
-    other_risk: str
+    rows: dict[str, Row]
     measure: str
     chosen: Table | None = None
 
     @property
-    def is_beaten(self) -> bool:
-        """Whether the other risk's held-out error is lower, by more than `NOTICEABLE`."""
-        return self.other.inconsistency < (1.0 - NOTICEABLE) * self.kept.inconsistency
+    def kept(self) -> Row:
+        """How well the policy itself predicts held-out samples."""
+        return self.rows[self.policy.risk]
 
-    def by_risk(self) -> dict[str, Row]:
-        """Return both rows by their risk, ordinary regression last."""
-        both = {self.policy.risk: self.kept, self.other_risk: self.other}
-        return dict(sorted(both.items(), key=lambda item: item[0] == "direct"))
+    @property
+    def better(self) -> str | None:
+        """The risk of least held-out error among those that are surely better than the policy's own, if there are."""
+        beaten_by = [
+            risk for risk, row in self.rows.items() if row is not self.kept and _is_better(row, self.kept)
+        ]
+        return min(beaten_by, key=lambda risk: self.rows[risk].error, default=None)
+
+
+def _is_better(one: Row, other: Row) -> bool:
+    if one.problem is not None or not one.error < other.error - NOTICEABLE * abs(other.error):
+        return False
+    if one.error < MUCH * other.error:
+        return True
+    gains = np.subtract(other.by_fold, one.by_fold)
+    return bool(gains.mean() > SURE * gains.std(ddof=1) / np.sqrt(len(gains)))
 
 
 def compare_risks(
@@ -65,7 +78,7 @@ def compare_risks(
     projections: ArrayLike | None = None,
     progress: Callable[[Row], None] | None = None,
 ) -> Comparison:
-    """Fit a policy, and its model with the other risk, and judge both on held-out episodes.
+    """Fit a policy, and its model with the other risks, and judge all on held-out episodes.
 
     Parameters
     ----------
@@ -85,7 +98,7 @@ def compare_risks(
     Returns
     -------
     Comparison
-        Both, on the same held-out episodes.
+        All of them, on the same held-out episodes.
 
     Raises
     ------
@@ -98,17 +111,11 @@ def compare_risks(
     if policy is None:
         found = select_policy("auto", X, U, groups, projections=projections, progress=progress)
         policy, chosen = found.policy, found.table
-    other_risk = "inconsistency" if policy.risk == "direct" else "direct"
-    kept, other = policy.risk, other_risk
-    pair = {kept: clone(policy), other: clone(policy).set_params(risk=other_risk)}
-    result = select_policy(pair, X, U, groups, projections=projections, progress=progress)
-    if result.table[kept].problem:
-        raise PolicyError(str(result.table[kept].problem))
-    return Comparison(
-        result.policies[kept],
-        result.table[kept],
-        result.table[other],
-        other_risk,
-        result.table.measure,
-        chosen,
-    )
+    policy.check_options()
+    by_risk = {risk: clone(policy).set_params(risk=risk) for risk in RISKS}
+    result = select_policy(by_risk, X, U, groups, projections=projections, progress=progress)
+    problem = result.table[policy.risk].problem
+    if problem is not None:
+        raise PolicyError(problem)
+    rows = {risk: result.table[risk] for risk in RISKS}
+    return Comparison(result.policies[policy.risk], rows, result.table.measure, chosen)

@@ -1,6 +1,10 @@
-"""The limit cycle, learnt from 40 constrained movements: what `unconstrain demo` shows, and Fig. 3 of the paper."""
+"""The limit cycle, learnt from 40 movements: what `unconstrain demo` shows, and Fig. 3 of the paper.
 
-from collections.abc import Mapping
+The paper's movements are constrained throughout and recorded without noise (`draw_data`, `learn`, `plot_fields`). Those
+of the demo are half free, and noisy, as recordings are (`draw_recordings`, `learn_shown`, `plot_shown`).
+"""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,6 +21,62 @@ MOVEMENTS, FEW = 40, 4
 
 WIDTH = 0.8
 """σ of the RBFs, twice the spacing of their 6 x 6 grid over [-1, 1]²: one for everything in this experiment."""
+
+
+FREE, NOISE = 0.5, 0.05
+"""Share of constraints that are left out in the demo's movements, and noise as a share of the actions' deviation."""
+
+SHOWN = {
+    "direct": "ordinary regression",
+    "inconsistency": "inconsistency",
+    "adaptive": "adaptive",
+    "told": "told every constraint",
+}
+"""How the demo learns: by the three risks, and knowing all projections."""
+
+
+def draw_recordings(seed: int) -> tuple[Demonstrations, Demonstrations]:
+    """Simulate the demo's recordings: 40 movements to learn from, with noise, and 40 others, without.
+
+    Parameters
+    ----------
+    seed : int
+        Number of the data set.
+
+    Returns
+    -------
+    training : Demonstrations
+        40 movements, half of them free, with noise.
+    test : Demonstrations
+        40 others of the same kind, without noise.
+    """
+    first, second = (np.random.default_rng([seed, stream]) for stream in (3, 4))
+    training = demonstrate(MOVEMENTS, noise=NOISE, free=FREE, random_state=first)
+    return training, demonstrate(MOVEMENTS, free=FREE, random_state=second)
+
+
+def learn_shown(training: Demonstrations, way: str) -> ParametricPolicy:
+    """Learn the policy behind the demo's recordings.
+
+    Parameters
+    ----------
+    training : Demonstrations
+        With the true projections, if `way` is "told".
+    way : str
+        One of `SHOWN`.
+
+    Returns
+    -------
+    ParametricPolicy
+        Fitted.
+    """
+    X, U, episodes = training.states, training.actions, training.episodes
+    if way != "told":
+        return make_policy(way).fit(X, U, groups=episodes)
+    assert training.projections is not None
+    # Noise is in every direction, so what the constraint takes away is not recorded: it is known to be zero.
+    seen = np.einsum("nij,nj->ni", training.projections, U)
+    return make_policy("inconsistency").fit(X, seen, groups=episodes, projections=training.projections)
 
 
 def draw_data(seed: int, noise: float = 0.0) -> tuple[Demonstrations, Demonstrations]:
@@ -124,32 +184,69 @@ def plot_fields(captions: Mapping[str, str] | None = None) -> Figure:
         Four panels side by side.
     """
     training, test = draw_data(0)
-    free = demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))
-    panels = [
+    panels = []
+    for title, way, movements, color in (
         ("learnt, {} movements", "inconsistency", FEW, LEARNT),
         ("learnt, {} movements", "inconsistency", MOVEMENTS, LEARNT),
         ("ordinary regression", "direct", MOVEMENTS, DIRECT),
-    ]
-    figure = Figure(figsize=(14.0, 4.3), layout="constrained")
-    first, *others = figure.subplots(1, 4)
+    ):
+        policy = learn(training, way, movements)
+        if captions is None:
+            caption = _caption(measure_errors(policy, test))
+        else:
+            caption = captions[f"{way}, {movements} trajectories"]
+        seen = training.select(training.episodes < movements)
+        panels.append((title.format(movements), policy, seen, color, caption))
+    return _plot_panels(panels)
+
+
+def plot_shown(policies: Mapping[str, ParametricPolicy]) -> Figure:
+    """Plot the true policy beside those that were learnt from the demo's recordings, of data set 0.
+
+    Parameters
+    ----------
+    policies : mapping
+        Fitted, by names of `SHOWN`.
+
+    Returns
+    -------
+    Figure
+        A panel for each, and one for the truth, side by side.
+    """
+    training, test = draw_recordings(0)
+    return _plot_panels(
+        [
+            (
+                SHOWN[way],
+                policy,
+                training,
+                DIRECT if way == "direct" else LEARNT,
+                _caption(measure_errors(policy, test)),
+            )
+            for way, policy in policies.items()
+        ]
+    )
+
+
+def _caption(errors: Mapping[str, float]) -> str:
+    return "   ".join(f"{name} {value:.2g}" for name, value in errors.items())
+
+
+def _plot_panels(panels: Sequence[tuple[str, ParametricPolicy, Demonstrations, str, str]]) -> Figure:
+    """Plot the true policy, and a panel for each title, policy, movements, colour and caption."""
+    free = demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))
+    figure = Figure(figsize=(3.5 * (len(panels) + 1), 4.3), layout="constrained")
+    first, *others = figure.subplots(1, len(panels) + 1)
     # The length of the arrows halfway between the cycle and the corners: those at the corners may overlap.
     longest = float(np.linalg.norm(LimitCycle()(np.array([[0.8, 0.8]]))))
     plot.trajectory(free.states, episodes=free.episodes, ax=first)
     plot.field(LimitCycle(), color=TRUE, longest=longest, ax=first)
     first.set_title("true policy", fontsize=12)
     first.set_xlabel("x1")
-    for ax, (title, way, movements, color) in zip(others, panels, strict=True):
-        policy = learn(training, way, movements)
-        shown = training.select(training.episodes < movements)
+    for ax, (title, policy, shown, color, caption) in zip(others, panels, strict=True):
         plot.trajectory(shown.states, episodes=shown.episodes, ax=ax)
         plot.field(policy, color=color, longest=longest, ax=ax)
-        ax.set_title(title.format(movements), fontsize=12)
-        if captions is None:
-            caption = "   ".join(
-                f"{name} {value:.2g}" for name, value in measure_errors(policy, test).items()
-            )
-        else:
-            caption = captions[f"{way}, {movements} trajectories"]
+        ax.set_title(title, fontsize=12)
         ax.set_xlabel(f"x1\n{caption}")
     for ax in figure.axes:
         ax.set_aspect("equal", adjustable="box")

@@ -1,21 +1,23 @@
-"""Choosing among policies by their inconsistency on episodes held out, which needs nothing but recordings.
+"""Choosing among policies by what they predict of episodes held out, which needs nothing but recordings.
 
 Every candidate is fitted once, its samples added up by fold. Leaving a fold out is a subtraction of its moments, so
 the solution without fold k, with λ chosen anew among the other folds, costs no second pass over the data. Its
-predictions for the episodes of fold k are compared with their actions, and all folds' errors are pooled:
+predictions for the episodes of fold k are compared with their actions, and all folds' errors are pooled.
 
-    E_i = 1/N Σ_k Σ_(n in fold k) (r_n - û_nᵀ π_(without k)(x_n))²
+All candidates are judged by one measure (`judging`): which samples were free is taken, fold by fold, from the one whose
+held-out likelihood is largest among those that infer it. By their inconsistency alone, candidates that learn only along
+the motion would be preferred where recordings are free and noisy, since all they miss lies across it.
 
 The folds are the same for all candidates. What features take from the states alone (centres, knots, ranges) they
-take from all of them, as one fit does; nothing of a held-out action enters. No true policy is used: that the least
-inconsistent candidate is also the one nearest to the true policy is likely, not certain, since directions that no
-episode ever moved in are not judged. Where projections of some samples are known, their error is that under the
-constraint, which judges more of the policy.
+take from all of them, as one fit does, and so does the inference of contact: a held-out action is judged by parameters
+that were solved without it. No true policy is used: that the candidate with the least error is also the one nearest to
+the true policy is likely, not certain, since directions that no episode ever moved in are not judged. Where projections
+of some samples are known, their error is that under the constraint, which judges more of the policy.
 """
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,8 +37,8 @@ from unconstrain.arrays import (
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
-from unconstrain.fitting.observation import observe, squared_errors
 from unconstrain.fitting.solve import splits
+from unconstrain.judging import INCONSISTENCY, OF_WHAT_IS_KNOWN, OF_WHAT_IS_SHOWN, OF_WHOLE_ACTIONS, Judge
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
@@ -47,9 +49,6 @@ MOST_PARAMETERS = 1000
 MOST_CENTERS = 50
 COARSE_KNOTS = 15
 
-INCONSISTENCY = "held-out inconsistency"
-OF_WHAT_IS_KNOWN = "held-out error of what is known"
-
 
 @dataclass(frozen=True)
 class Row:
@@ -59,13 +58,13 @@ class Row:
     ----------
     name : str
         Of the candidate.
-    inconsistency : float
-        Pooled over held-out samples, in squared units of the action; NaN where the candidate failed. Where projections
-        are known it is the error under them.
+    error : float
+        Mean over held-out samples, in squared units of the action, by the table's measure; NaN where the candidate
+        failed, or is not judged yet.
     standard_error : float
-        Of the inconsistency, over folds. Candidates share the folds, so differences are surer than it says.
+        Of the error, over folds. Candidates share the folds, so differences are surer than it says.
     explained : float
-        Share of held-out motion explained, `1 - Σ (r - û·p)² / Σ r²`.
+        Share of held-out motion explained, as shown: `1 - Σ [γ ‖u - p‖² + (1 - γ) (r - û·p)²] / Σ r²`.
     alpha : float
         Weight decay λ, as chosen on all the data.
     n_parameters : int
@@ -74,16 +73,22 @@ class Row:
         To fit and to hold out.
     problem : str, optional
         Why the candidate could not be fitted.
+    log_likelihood : float
+        Of a held-out sample, where the candidate infers which samples were free.
+    by_fold : tuple of float
+        Mean error in each fold.
     """
 
     name: str
-    inconsistency: float = np.nan
+    error: float = np.nan
     standard_error: float = np.nan
     explained: float = np.nan
     alpha: float = np.nan
     n_parameters: int = 0
     seconds: float = 0.0
     problem: str | None = None
+    log_likelihood: float = np.nan
+    by_fold: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,7 @@ class Table:
     Parameters
     ----------
     rows : tuple of Row
-        The least inconsistent candidate first, and the failed ones last.
+        The candidate with the least error first, and the failed ones last.
     measure : str
         What the candidates are judged by.
     """
@@ -151,7 +156,7 @@ class Selection:
 
 
 def candidates(n: int, d: int) -> dict[str, Policy]:
-    """Make the candidates of "auto", all with λ chosen by held-out inconsistency.
+    """Make the candidates of "auto", which infer what was free, and choose λ by cross-validation.
 
     Numbers of centres and knots shrink with the dimension, so that solving stays a matter of seconds; splines, where
     even the fewest knots are too many, are left out. Those that pair actions with states are there where n = d.
@@ -199,7 +204,13 @@ def select_policy(
     n_jobs: int | None = None,
     progress: Callable[[Row], None] | None = None,
 ) -> Selection:
-    """Choose the candidate with the least inconsistency on held-out episodes, and fit it to all the data.
+    """Choose the candidate with the least error on held-out episodes, and fit it to all the data.
+
+    The error is that of what held-out samples show: of the whole action as far as a sample was free, of what lies
+    along the motion otherwise. Which samples were free is inferred, by the likeliest candidate with the risk
+    "adaptive"; where there is none, and risks differ, by one made of the candidate that is least inconsistent.
+    Candidates that all have the risk "inconsistency" are judged by their inconsistency, and those that all have
+    "direct" by whole actions.
 
     Parameters
     ----------
@@ -214,11 +225,11 @@ def select_policy(
         Episodes, which are held out whole; without them contiguous blocks are.
     projections : array_like of shape (N, d, d), optional
         The nullspace projections, all NaN where one is not known. Candidates are then judged by the error under them,
-        and those with the risk "inconsistency" learn from them.
+        and those with other risks than "direct" learn from them.
     n_jobs : int, optional
         Candidates fitted at a time, in threads (joblib; most of the work is in BLAS and LAPACK).
     progress : callable, optional
-        Called with each candidate's `Row` once it is done, in the order given.
+        Called with each candidate's `Row` once it is fitted, in the order given. Errors are there only once all are.
 
     Returns
     -------
@@ -255,25 +266,40 @@ def select_policy(
     metrics.explained(actions, np.zeros_like(actions))
 
     parallel = joblib.Parallel(n_jobs=n_jobs, prefer="threads", return_as="generator")
-    rows, policies = [], {}
-    judged = parallel(
-        joblib.delayed(_judge)(name, policy, X, U, groups, projections) for name, policy in named.items()
+    rows, held_out = [], {}
+    fitting = parallel(
+        joblib.delayed(_try)(name, policy, X, U, groups, projections) for name, policy in named.items()
     )
-    for row, policy in judged:
+    for row, found in fitting:
         rows.append(row)
-        if policy is not None:
-            policies[row.name] = policy
+        if found is not None:
+            held_out[row.name] = found
         if progress is not None:
             progress(row)
-    rows.sort(key=lambda row: (row.problem is not None, row.inconsistency))
-    if rows[0].problem is not None:
-        if len({row.problem for row in rows}) == 1:
-            raise PolicyError(rows[0].problem)
+    problems = [row.problem for row in rows]
+    if not held_out:
+        if len(set(problems)) == 1:
+            raise PolicyError(str(problems[0]))
         raise PolicyError(
             f"none of the candidates could be fitted; the first, {rows[0].name}: {rows[0].problem}"
         )
-    table = Table(tuple(rows), INCONSISTENCY if projections is None else OF_WHAT_IS_KNOWN)
-    return Selection(policies[rows[0].name], rows[0].name, table, policies)
+    judge = _choose_judge(held_out, X, U, groups, projections)
+    rows = [_judge(row, held_out[row.name], judge, actions) if row.problem is None else row for row in rows]
+    rows.sort(key=lambda row: (row.problem is not None, row.error))
+    policies = {name: found.policy for name, found in held_out.items()}
+    return Selection(policies[rows[0].name], rows[0].name, Table(tuple(rows), judge.measure), policies)
+
+
+@dataclass(frozen=True)
+class _HeldOut:
+    """A candidate, and what it says of samples that it has not learnt from."""
+
+    policy: Policy
+    predictions: np.ndarray
+    fold: np.ndarray
+    free: np.ndarray | None = None
+    noise: float | None = None
+    log_likelihood: float = np.nan
 
 
 def _name_candidates(
@@ -304,40 +330,81 @@ def _name_candidates(
     return named
 
 
-def _judge(
+def _try(
     name: str,
     policy: Policy,
     X: np.ndarray,
     U: Any,
     groups: np.ndarray | None,
     projections: np.ndarray | None,
-) -> tuple[Row, Policy | None]:
+) -> tuple[Row, _HeldOut | None]:
+    """Fit a candidate, or say why it cannot be."""
     start = time.perf_counter()
     try:
-        known = None if policy.risk == "direct" else projections
-        fitted, predictions, fold = _hold_out(policy, X, U, groups, known)
-        observation = observe("inconsistency", check_actions(U), projections)
-        errors = squared_errors(observation, predictions)
-        means = np.array([errors[fold == k].mean() for k in np.unique(fold)])
-        row = Row(
-            name,
-            inconsistency=float(errors.mean()),
-            standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
-            explained=1.0 - float(errors.sum() / observation.squares.sum()),
-            alpha=fitted.alpha_,
-            n_parameters=fitted.solution_.w.size,
-            seconds=time.perf_counter() - start,
-        )
+        found = _hold_out(policy, X, U, groups, None if policy.risk == "direct" else projections)
     except ValueError as error:  # ours, and those of transformers from elsewhere
         sentence = " ".join(str(error).split())
         return Row(name, seconds=time.perf_counter() - start, problem=sentence), None
-    return row, fitted
+    row = Row(
+        name,
+        alpha=found.policy.alpha_,
+        n_parameters=found.policy.solution_.w.size,
+        seconds=time.perf_counter() - start,
+        log_likelihood=found.log_likelihood,
+    )
+    return row, found
+
+
+def _choose_judge(
+    held_out: Mapping[str, _HeldOut],
+    X: np.ndarray,
+    U: Any,
+    groups: np.ndarray | None,
+    projections: np.ndarray | None,
+) -> Judge:
+    """Find out which samples were free, by the candidate that says so best."""
+    actions = check_actions(U)
+    risks = {found.policy.risk for found in held_out.values()}
+    inferred = [found for found in held_out.values() if found.free is not None]
+    none_free = np.zeros(len(actions))
+    inconsistency = Judge(INCONSISTENCY if projections is None else OF_WHAT_IS_KNOWN, none_free, projections)
+    if risks == {"inconsistency"}:
+        return inconsistency
+    if risks == {"direct"}:
+        measure = OF_WHOLE_ACTIONS if projections is None else OF_WHAT_IS_KNOWN
+        return Judge(measure, np.ones(len(actions)), projections)
+    if not inferred:
+        best = min(
+            held_out.values(), key=lambda found: np.mean(inconsistency.errors(actions, found.predictions))
+        )
+        _, added = _try("", clone(best.policy).set_params(risk="adaptive"), X, U, groups, projections)
+        if added is None:
+            return inconsistency
+        inferred = [added]
+    likeliest = max(inferred, key=lambda found: found.log_likelihood)
+    assert likeliest.free is not None
+    measure = OF_WHAT_IS_SHOWN if projections is None else OF_WHAT_IS_KNOWN
+    return Judge(measure, likeliest.free, projections, likeliest.noise)
+
+
+def _judge(row: Row, found: _HeldOut, judge: Judge, U: np.ndarray) -> Row:
+    """Complete a candidate's row."""
+    errors = judge.errors(U, found.predictions)
+    missed = judge.unexplained(U, found.predictions)
+    means = np.array([errors[found.fold == k].mean() for k in np.unique(found.fold)])
+    return replace(
+        row,
+        error=float(errors.mean()),
+        standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
+        explained=1.0 - float(missed.sum() / np.einsum("nd,nd->", U, U)),
+        by_fold=tuple(means.tolist()),
+    )
 
 
 def _hold_out(
     policy: Policy, X: np.ndarray, U: Any, groups: np.ndarray | None, projections: np.ndarray | None
-) -> tuple[Policy, np.ndarray, np.ndarray]:
-    """Fit a policy to all samples, predict held-out ones (N, d), and tell the fold of each sample (N,)."""
+) -> _HeldOut:
+    """Fit a policy to all samples, and judge each sample by parameters that were solved without its fold."""
     if policy.alpha != "cv":  # `fit` does not get to see it
         check_number(policy.alpha, "alpha", positive=False)
     fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)
@@ -347,6 +414,8 @@ def _hold_out(
     assert accumulator.folds is not None
     fold = accumulator.folds.assign(groups, len(X))
     predictions = np.empty((len(X), fitted.n_actions_))
+    is_inferred = policy.risk == "adaptive"
+    free = np.empty(len(X)) if is_inferred else None
     present = [k for k, part in enumerate(accumulator.total.moments) if part is not None]
     for k in np.unique(fold).tolist():
         if policy.alpha == "cv" and len(present) - (k in present) < 2:
@@ -361,14 +430,28 @@ def _hold_out(
             )
         else:
             left = fitted.solved(without=k)
-        predictions[fold == k] = check_actions(left.predict(X[fold == k]), "predictions")
-    return fitted, predictions, fold
+        rows = fold == k
+        predictions[rows] = check_actions(left.predict(X[rows]), "predictions")
+        if free is not None:
+            free[rows] = left.free_probability(
+                X[rows],
+                np.asarray(U)[rows],
+                groups=None if groups is None else groups[rows],
+                projections=None if projections is None else projections[rows],
+            )
+    if not is_inferred:
+        return _HeldOut(fitted, predictions, fold)
+    belief, likelihood = fitted.solution_.belief, fitted.log_likelihood_
+    assert belief is not None
+    if policy.alpha != "cv":  # contact was inferred with another λ than the one asked for
+        fitted = clone(policy).fit(X, U, groups=groups, projections=projections)
+    return _HeldOut(fitted, predictions, fold, free, belief.noise.across, likelihood)
 
 
 def _cells(row: Row) -> tuple[str, ...]:
     return (
         row.name,
-        f"{row.inconsistency:.4g} ± {row.standard_error:.1g}",
+        f"{row.error:.4g} ± {row.standard_error:.1g}",
         f"{row.explained:.6f}",
         f"{row.alpha:.2g}",
         str(row.n_parameters),

@@ -16,7 +16,11 @@ def test_recordings_are_read_as_when_the_policy_was_fitted(run, movements, tmp_p
     toy.demonstrate(5, random_state=1).save(others)
     code, out, _ = run("evaluate", "policy.skops", others, "--state", "states", "--action", "actions")
     assert code == 0
-    assert share(out.splitlines()[-2]) > 0.9
+    (everything,) = (line for line in out.splitlines() if line.startswith("│ all "))
+    assert share(everything) > 0.9
+    assert "°" in everything
+    assert "of the recordings it was learnt from" in out
+    assert "noise: " in out
     code, out, _ = run("evaluate", "policy.skops", movements, "--min-speed", "0.5")
     assert code == 0
     assert "slower than 0.5" in out

@@ -19,11 +19,31 @@ def test_the_policy_is_saved_and_held_against_ordinary_regression(run, movements
     assert code == 0
     assert "1600 samples, 40 episodes" in out
     assert (tmp_path / "f.png").stat().st_size > 10_000
-    learnt, direct = (line for line in out.splitlines() if "%" in line)
-    assert "inconsistency (saved)" in learnt
-    assert share(learnt) > 0.9 > 0.8 > share(direct)
+    learnt, inconsistency, direct = (line for line in out.splitlines() if "%" in line and "│" in line)
+    assert "adaptive (saved)" in learnt
+    assert min(share(learnt), share(inconsistency)) > 0.9 > 0.8 > share(direct)
     assert "warning: the policy learnt by" not in out
-    assert uc.load_policy("p.skops").risk == "inconsistency"
+    for told in (
+        "of the samples were free",
+        "in the unit of the action",
+        "if all free",
+        "if all constrained",
+    ):
+        assert told in out
+    assert "no contact was found" not in out
+    assert uc.load_policy("p.skops").risk == "adaptive"
+
+
+def test_where_nothing_is_in_the_way_that_is_said(run, tmp_path):
+    write_csv(toy.demonstrate(10, noise=0.3, constrained=False, random_state=0), tmp_path / "free.csv")
+    code, out, err = run("fit", "free.csv", *COLUMNS, "--model", "rbf")
+    assert code == 0, err
+    assert "no contact was found in these recordings, so this is ordinary regression" in out
+    assert "warning: the policy learnt by" not in out
+    code, out, err = run("diagnose", "free.csv", *COLUMNS, "--model", "rbf")
+    assert code == 0, err
+    assert "no contact was found" in out
+    assert "noise: " in out
 
 
 def test_a_policy_that_loses_to_ordinary_regression_says_so(run, tmp_path):

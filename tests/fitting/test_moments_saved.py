@@ -19,7 +19,7 @@ GROUPS = np.arange(300) // 20
 
 
 def fitted(alpha="cv"):
-    return uc.ParametricPolicy(alpha=alpha).fit(X[:200], U[:200], groups=GROUPS[:200])
+    return uc.ParametricPolicy(risk="inconsistency", alpha=alpha).fit(X[:200], U[:200], groups=GROUPS[:200])
 
 
 def assert_equal(a, b):
@@ -73,7 +73,7 @@ def test_moments_of_two_days_add_to_those_of_both(tmp_path):
 def test_a_resumable_policy_goes_on_where_it_stopped(tmp_path):
     fitted().save(tmp_path / "yesterday.skops", resumable=True)
     today = uc.load_policy(tmp_path / "yesterday.skops").partial_fit(X[200:], U[200:], groups=GROUPS[200:])
-    both = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=GROUPS)
+    both = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(X, U, groups=GROUPS)
     assert today.resume().folds.fold_of == both.resume().folds.fold_of
     np.testing.assert_allclose(today.predict(X), both.predict(X), rtol=1e-9, atol=1e-12)
 

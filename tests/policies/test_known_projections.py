@@ -25,8 +25,8 @@ def test_projections_that_are_not_known_change_nothing(problem):
         return
     centers, width = X[:3].copy(), 2.0 * float(np.std(X)) + 1e-3
     for policy in (
-        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width), alpha=1e-3),
-        uc.LocallyLinearPolicy(centers=centers, width=width, alpha=1e-3),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width), alpha=1e-3, risk="inconsistency"),
+        uc.LocallyLinearPolicy(centers=centers, width=width, alpha=1e-3, risk="inconsistency"),
     ):
         plain = clone(policy).fit(X, U).predict(X)
         unknown = clone(policy).fit(X, U, projections=np.full_like(N, np.nan)).predict(X)
@@ -39,7 +39,7 @@ def test_known_projections_are_learnt_from_by_the_error_under_them(problem):
     X, _, N, U, _ = problem
     if not np.any(U):
         return
-    policy = uc.ParametricPolicy(alpha=1e-3).fit(X, U, projections=N)
+    policy = uc.ParametricPolicy(alpha=1e-3, risk="inconsistency").fit(X, U, projections=N)
     # States count from their mean in units of their spread, both weighted by how much each projection shows.
     shown = np.einsum("nij,nij->n", N, N)
     mean = np.average(X, axis=0, weights=shown)

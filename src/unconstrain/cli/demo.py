@@ -12,11 +12,12 @@ from unconstrain.errors import UnconstrainError
 from unconstrain.progress import working
 
 WAYS = {
-    "inconsistency": "the policy behind them (inconsistency)",
     "direct": "ordinary regression (direct)",
-    "oracle": "shown the true policy itself (oracle)",
+    "inconsistency": "as if none of it were free (inconsistency)",
+    "adaptive": "what was free is inferred (adaptive)",
+    "told": "told every constraint (told)",
 }
-COLUMNS = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explained")
+COLUMNS = ("learnt from the same 40 movements", "nUPE", "nCPE")
 
 
 @command(short_help="Learn from simulated movements, and draw it.")
@@ -29,7 +30,7 @@ COLUMNS = ("learnt from the same 40 movements", "nUPE", "nCPE", "motion explaine
 )
 @click.option("--overwrite", is_flag=True, help="Replace what an earlier demo left in that folder.")
 def demo(out: Path, overwrite: bool) -> None:
-    """Simulate 40 constrained movements, learn the policy behind them, draw it."""
+    """Simulate 40 movements, noisy and half of them constrained, learn the policy behind them, draw it."""
     out = atomic.as_path(out)
     picture, table = out / "limit-cycle.png", out / "table.md"
     data, others = out / "movements.csv", out / "others.csv"
@@ -40,18 +41,18 @@ def demo(out: Path, overwrite: bool) -> None:
     for path in (picture, table, data, others):
         outputs.check_new(path, "out", overwrite=overwrite)
     from unconstrain import demo as experiment
-    from unconstrain import metrics, plot
+    from unconstrain import plot
+    from unconstrain.policies.inferred import describe_inferred
     from unconstrain.recordings.text import write_csv
 
-    rows = []
-    with working("40 movements around a limit cycle, each bent by three unknown constraints"):
-        training, test = experiment.draw_data(0)
+    with working("40 movements around a limit cycle, half of them bent by unknown constraints"):
+        training, test = experiment.draw_recordings(0)
+        policies = {way: experiment.learn_shown(training, way) for way in WAYS}
+        rows = []
         for way, name in WAYS.items():
-            policy = experiment.learn(training, way)
-            errors = experiment.measure_errors(policy, test)
-            share = metrics.explained(test.actions, policy.predict(test.states))
-            rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}", f"{share:.2%}"))
-        plot.save(experiment.plot_fields(), picture)
+            errors = experiment.measure_errors(policies[way], test)
+            rows.append((name, f"{errors['nUPE']:.2g}", f"{errors['nCPE']:.2g}"))
+        plot.save(experiment.plot_shown(policies), picture)
         write_csv(training, data)
         write_csv(test, others)
         _write_markdown(COLUMNS, rows, table)
@@ -59,11 +60,12 @@ def demo(out: Path, overwrite: bool) -> None:
     reporting.say(
         "nUPE, nCPE: squared error without and with constraints, as a share of the policy's variance"
     )
+    reporting.say(describe_inferred(policies["adaptive"]))
     reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}\nheld out: {others}")
     reporting.say("\nnext, the same from a file (put your own in its place):")
     reporting.say(
         f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --episode episode --model rbf "
-        f"--out {reporting.shell_word(out / 'policy.skops')} --overwrite"
+        f"--width {experiment.WIDTH} --out {reporting.shell_word(out / 'policy.skops')} --overwrite"
     )
 
 

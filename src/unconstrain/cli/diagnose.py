@@ -53,6 +53,7 @@ def diagnose(
     if model.is_chosen:
         raise PolicyError("this command is about one model: choose --model linear, rbf or locally-linear")
     from unconstrain.diagnostics import identifiability
+    from unconstrain.policies.inferred import describe_inferred
 
     with working("reading"):
         demos = recorded.load()
@@ -67,6 +68,9 @@ def diagnose(
         from unconstrain import plot
 
         plot.save(plot.identifiability_figure(found, demos.state_names), figure)
+    inferred = describe_inferred(policy)
+    if inferred:
+        reporting.say(f"{inferred}\n")
     reporting.say(text)
     if found.n_silent:
         reporting.say(f"{found.n_silent} samples do not move, and say nothing")

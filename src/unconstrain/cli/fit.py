@@ -89,12 +89,16 @@ def fit(
         opened = recorded.open()
         demos = opened.load() if named or (not is_stream and opened.fits_in_memory) else None
     if demos is None:
+        from unconstrain.policies.inferred import describe_inferred
         from unconstrain.scaling.summary import describe_fit
 
         policy = _fit_stream(opened, model, checkpoint, cluster)
         policy.recording_ = recorded.kept()
         policy.save(out, resumable=resumable)
         reporting.say(describe_fit(policy))
+        inferred = describe_inferred(policy)
+        if inferred:
+            reporting.say(inferred)
         reporting.say(
             "not compared with ordinary regression, as this was a stream: to compare, fit with `--risk direct` too, "
             "and `unconstrain evaluate` both"
@@ -142,31 +146,36 @@ def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) ->
 
 def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
     from unconstrain.diagnostics import identifiability
+    from unconstrain.policies.inferred import describe_inferred
 
     policy = comparison.policy
     if comparison.chosen is not None:
         reporting.say(str(comparison.chosen))
-    reporting.say(
-        f"zero actions: {policy.n_zero_actions_} without a direction, left out by the inconsistency"
-    )
+    left_out = ", left out by the inconsistency" if policy.risk == "inconsistency" else ""
+    reporting.say(f"zero actions: {policy.n_zero_actions_} without a direction{left_out}")
     chosen = " (chosen by cross-validation)" if policy.alpha == "cv" else ""
     reporting.say(f"λ: {policy.alpha_:.3g}{chosen}")
+    inferred = describe_inferred(policy)
+    if inferred:
+        reporting.say(inferred)
     reporting.say_table(
-        ("learnt by", comparison.measure, "share of observed motion explained"),
+        ("learnt by", comparison.measure, "share of what is shown explained"),
         [
             (
                 f"{risk} (saved)" if row is comparison.kept else risk,
-                f"{row.inconsistency:.4g}",
+                f"{row.error:.4g}",
                 f"{row.explained:.2%}",
             )
-            for risk, row in comparison.by_risk().items()
+            for risk, row in comparison.rows.items()
+            if row.problem is None
         ],
     )
-    if comparison.is_beaten:
-        rival = "ordinary regression" if comparison.other_risk == "direct" else "inconsistency"
+    better = comparison.better
+    if better is not None:
+        rival = "ordinary regression" if better == "direct" else f"the risk {better}"
         reporting.say(
             f"warning: the policy learnt by {rival} is better by this measure than the one that is saved; "
-            f"`--risk {comparison.other_risk}` saves it instead"
+            f"`--risk {better}` saves it instead"
         )
     report = identifiability(policy, demos.states, demos.actions, projections=demos.projections)
     if 1.0 - report.determined_share >= WORTH_A_WARNING:

@@ -213,6 +213,11 @@ class Accumulator:
             n_known=0 if samples.projections is None else int(np.sum(~unknown(samples.projections))),
             longest=longest,
         )
+        if self.risk == "adaptive" and samples.weights is not None and not samples.weights.all():
+            # Left out here, so that they do not speak for their neighbours either.
+            rows = np.flatnonzero(samples.weights)
+            samples, counted = samples.select(rows), counted[rows]
+            fold = None if fold is None else fold[rows]
         if self.compared:
             return replace(
                 counts, tallies=tuple(self._compare(each, samples, fold) for each in self.compared)
@@ -226,7 +231,9 @@ class Accumulator:
         moments = self._by_fold(samples, found.expand(), counted, fold)
         judges: tuple[Moments | None, ...] = ()
         if self.is_judged:
-            judges = self._by_fold(samples, found.judge(self.scale), counted, fold)
+            judges = self._by_fold(
+                samples, found.judge(self.scale, 0.0 if self.belief.is_cooling else None), counted, fold
+            )
         return replace(counts, moments=moments, judges=judges, tallies=(found.tally,))
 
     def include(self, sums: Sums) -> None:
@@ -405,7 +412,7 @@ class Accumulator:
 
     def _compare(self, beliefs: tuple[Belief, ...], samples: Samples, fold: np.ndarray | None) -> Tally:
         """Sum up the likelihood of samples under beliefs: one for all, or one for each fold."""
-        if fold is None or len(beliefs) == 1:
+        if fold is None or len(beliefs) == 1 or not len(fold):
             return infer(self.model, beliefs[0], samples).tally
         tallies = []
         for k in np.unique(fold).tolist():

@@ -23,8 +23,9 @@ NEVER = 1e-6
 CHANGES_BEFORE, STAYS_BEFORE = 1.0, 29.0
 # As if so many samples of either kind had been seen before.
 SAMPLES_BEFORE = 1.0
-MOST_TELLING = 600.0
-"""Log-likelihoods further apart than this are as good as certain, and their exponential is still a number."""
+MOST_TELLING = 200.0
+"""Log-likelihoods further apart than this are as good as certain, and a product of a few exponentials is still a
+number."""
 
 
 @dataclass(frozen=True)
@@ -94,19 +95,22 @@ def smooth(
     starts: NDArray[np.bool_],
     chain: Chain,
     log_kept: Floats | None = None,
+    weights: Floats | None = None,
 ) -> tuple[Floats, Floats, Counts, Floats]:
     """Compute how surely each sample was free, given all samples of its episode.
 
     Parameters
     ----------
     log_free, log_constrained : ndarray of shape (N,)
-        Log-likelihood of each sample under either state.
+        Log-likelihood of each sample under either state; -inf where the state is known not to hold.
     starts : ndarray of shape (N,), bool
         Whether an episode begins with the sample.
     chain : Chain
         Probabilities of the states.
     log_kept : ndarray of shape (N,), optional
         How much likelier a sample is where it and the one before it are both constrained, as a logarithm.
+    weights : ndarray of shape (N,), optional
+        How often each sample counts in the counts, 1 by default; a change counts as its later sample.
 
     Returns
     -------
@@ -122,9 +126,10 @@ def smooth(
     T = chain.transitions
     first = np.array([chain.free_share, 1 - chain.free_share])
     top = np.maximum(log_free, log_constrained)
-    likelihood = np.exp(
-        np.maximum(np.stack([log_free, log_constrained], axis=1) - top[:, None], -MOST_TELLING)
-    )
+    relative = np.stack([log_free, log_constrained], axis=1) - top[:, None]
+    # What is known stays certain, however strongly the neighbours speak against it.
+    likelihood = np.where(np.isneginf(relative), 0.0, np.exp(np.maximum(relative, -MOST_TELLING)))
+    omega = np.ones_like(top) if weights is None else weights
     moves = np.broadcast_to(T, (len(top), 2, 2)).copy()
     if log_kept is not None:
         moves[:, CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))
@@ -136,7 +141,7 @@ def smooth(
         joint = first * likelihood
         norm = joint.sum(axis=1)
         free = joint[:, FREE] / norm
-        states = np.array([free.sum(), len(free) - free.sum()])
+        states = np.array([omega @ free, omega @ (1 - free)])
         return free, top + np.log(norm), Counts(states, np.zeros((2, 2))), np.zeros_like(free)
     ahead = _sweep(steps)
     behind = np.empty_like(ahead)
@@ -153,7 +158,8 @@ def smooth(
     pairs /= pairs.sum(axis=(1, 2), keepdims=True)
     kept = np.zeros_like(top)
     kept[inner] = pairs[:, CONSTRAINED, CONSTRAINED]
-    return both[:, FREE], log_likelihood, Counts(both.sum(axis=0), pairs.sum(axis=0)), kept
+    changes = np.einsum("n,nij->ij", omega[inner], pairs)
+    return both[:, FREE], log_likelihood, Counts(omega @ both, changes), kept
 
 
 def _sweep(steps: Floats) -> Floats:

@@ -33,9 +33,6 @@ from unconstrain.samples import Samples
 
 Floats = NDArray[np.float64]
 
-IMPOSSIBLE = -1e9
-"""The log-likelihood of a state that is known not to hold."""
-
 MOST_CORRELATED = 0.999
 
 
@@ -55,6 +52,8 @@ class Belief:
         How constrained samples follow each other on the sphere; without one each may be anywhere.
     held : {"free", "constrained"}, optional
         What all samples are taken for that are not known to be otherwise.
+    is_cooling : bool
+        Whether the noise is still being lowered, and so is larger than that of the samples.
     """
 
     w: Floats
@@ -62,6 +61,7 @@ class Belief:
     chain: Chain = field(default_factory=Chain)
     drift: Drift | None = None
     held: str | None = None
+    is_cooling: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ class Tally:
         `Σ (e_t² + e_{t-1}²) / 2`.
     shown, meant : float
         Sums of squared lengths, of actions and of predictions.
-    n_samples : int
-        How many.
+    n_samples : float
+        How many, each counted by its weight.
     """
 
     log_likelihood: float
@@ -96,7 +96,7 @@ class Tally:
     energy: float
     shown: float
     meant: float
-    n_samples: int
+    n_samples: float
 
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(
@@ -164,7 +164,7 @@ class Found(NamedTuple):
         parts = (free + blunt, along, towards, sphere.ahead, sphere.normal)
         return Expanded.of(views.P, gradient, error, *parts, known=self.known, projections=self.projections)
 
-    def judge(self, scale: float) -> Expanded:
+    def judge(self, scale: float, variance: float | None = None) -> Expanded:
         """Make the observation by which parameters are judged that were not learnt from these samples.
 
         It does not weigh samples by what is predicted, as likelihoods do, so that no prediction can make itself matter
@@ -175,6 +175,9 @@ class Found(NamedTuple):
         ----------
         scale : float
             Mean squared length of the actions.
+        variance : float, optional
+            Variance of the noise that it is corrected for; by default that of the belief. A variance larger than that
+            of the samples prefers policies that are too short, so an upper bound will not do.
 
         Returns
         -------
@@ -187,7 +190,7 @@ class Found(NamedTuple):
         Computational Statistics and Data Analysis 47, 2004.
         """
         U, free = self.views.U, self.taken_whole
-        d, v = U.shape[1], self.views.noise.across
+        d, v = U.shape[1], self.views.noise.across if variance is None else variance
         y = np.einsum("nd,nd->n", U, U)
         bent = (1 - free) / scale
         pulls = (free + bent * (y - (d + 2) * v))[:, None] * U
@@ -228,38 +231,42 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
         U[known] = np.einsum("nij,nj->ni", rows, U[known])
         P[known] = np.einsum("nij,nj->ni", rows, P[known])
         ranks[known] = np.einsum("nii->n", rows)
+    omega = np.ones(N) if samples.weights is None else samples.weights
     views = Views(U, P, belief.noise, ranks)
     log_free, log_bent = views.whole.log.copy(), views.constrained.log.copy()
     if belief.held is not None:
-        (log_bent if belief.held == "free" else log_free)[~known] = IMPOSSIBLE
+        (log_bent if belief.held == "free" else log_free)[~known] = -np.inf
     if len(rows):
         is_free = ranks[known] > d - 0.5
-        log_bent[known] = np.where(is_free, IMPOSSIBLE, log_free[known])
-        log_free[known] = np.where(is_free, log_free[known], IMPOSSIBLE)
+        log_bent[known] = np.where(is_free, -np.inf, log_free[known])
+        log_free[known] = np.where(is_free, log_free[known], -np.inf)
     starts = episode_starts(samples)
     steps = None
+    # Behind a known projection an action says nothing of where on the sphere it lies.
+    apart = starts | known
+    apart[1:] |= known[:-1]
     if belief.drift is not None and d > 1 and not starts.all():
         # Across the sphere there is no noise of speed.
         across = belief.noise.action + views.sphere.share * belief.noise.misfit
-        steps = Steps.of(views.sphere, across, starts, belief.drift)
+        steps = Steps.of(views.sphere, across, apart, belief.drift)
     free, log_likelihood, counts, kept = smooth(
         log_free,
         log_bent,
         starts,
         belief.chain,
         None if steps is None else steps.log_kept,
+        omega,
     )
     taken = np.where(known, 1.0, free)
-    omega = np.ones(N) if samples.weights is None else samples.weights
     tally = Tally(
         float(omega @ log_likelihood),
         counts,
         _squares(views, taken, omega),
-        Drifts() if steps is None else steps.sum(kept),
-        *_echo(views, taken, starts),
-        float(np.sum(U**2)),
-        float(np.sum(P**2)),
-        N,
+        Drifts() if steps is None else steps.sum(np.where(apart, 0.0, omega * kept)),
+        *_echo(views, taken, starts, omega),
+        float(omega @ np.einsum("nd,nd->n", U, U)),
+        float(omega @ np.einsum("nd,nd->n", P, P)),
+        float(omega.sum()),
     )
     return Found(views, free, taken, known, rows, tally)
 
@@ -304,9 +311,9 @@ def _squares(views: Views, free: Floats, omega: Floats) -> Squares:
     return Squares.sum(parts)
 
 
-def _echo(views: Views, free: Floats, starts: NDArray[np.bool_]) -> tuple[float, float]:
+def _echo(views: Views, free: Floats, starts: NDArray[np.bool_], omega: Floats) -> tuple[float, float]:
     """Sum up how residuals agree with those before them, and their squares."""
-    follows = ~starts[1:]
+    follows = omega[1:] * ~starts[1:]
     both, neither = free[1:] * free[:-1] * follows, (1 - free[1:]) * (1 - free[:-1]) * follows
     as_free = (views.U - views.P) / np.sqrt(views.noise.across)
     as_bent = (views.sphere.distance / np.sqrt(views.constrained.variance))[:, None]

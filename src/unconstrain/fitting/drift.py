@@ -27,6 +27,9 @@ does not quite fit change slowly, and must not pass for a constraint that does."
 
 RARELY = 1e-12
 
+BLURRIEST = 1e6
+"""Variance of a direction, in squared radians, that is as good as infinite: the sphere is far smaller than the noise."""
+
 
 @dataclass(frozen=True)
 class Drift:
@@ -113,7 +116,7 @@ class Steps:
         variance : ndarray of shape (N,)
             Of their distances to it.
         starts : ndarray of shape (N,), bool
-            Whether an episode begins with the sample.
+            Samples that are not compared with the one before them, as the first of each episode.
         drift : Drift
             As far as it is known.
 
@@ -123,8 +126,7 @@ class Steps:
             Of N samples.
         """
         N, d = sphere.out.shape
-        tiny = np.finfo(np.float64).tiny
-        blur = variance / np.maximum(sphere.radius**2, tiny)
+        blur = variance / np.maximum(sphere.radius**2, variance / BLURRIEST)
         chord, noise = np.zeros(N), np.zeros(N)
         chord[1:] = np.sum((sphere.out[1:] - sphere.out[:-1]) ** 2, axis=1)
         noise[1:] = CAUTION * (blur[1:] + blur[:-1])

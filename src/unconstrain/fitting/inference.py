@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from unconstrain.errors import DataError
 from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief
@@ -35,11 +36,14 @@ MOST_PASSES, SETTLING = 60, 4
 """Passes of a run at most, and those after the noise is found until which λ is still adjusted."""
 
 PASSES_PER_CHOICE = 5
-"""After so many passes λ is chosen anew, until it is fixed."""
+"""After so many passes λ is chosen anew, and once more before it is fixed."""
 
 HALVINGS = 5
 ENOUGH = 1e-4
 """Gain in log-likelihood, per sample, that is not worth another pass."""
+
+SMALLEST_SCALE, LARGEST_SCALE = 1e-120, 1e120
+"""Mean squares of the actions between which variances can be squared, and their inverses."""
 
 LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 """Deviation of the noise, as a share of the root mean square action; where speeds vary as well, a smaller one would let
@@ -117,7 +121,8 @@ class Run:
     def chooses_alpha(self) -> bool:
         """Whether λ is chosen with the next pass; runs that start where another ended take that one's."""
         begins_anew = self.most != SHORT_RUN
-        return begins_anew and not self.is_climbing and self.passes % PASSES_PER_CHOICE == 0
+        due = self.passes % PASSES_PER_CHOICE == 0 or self.since_cool == SETTLING - 1
+        return begins_anew and not self.is_climbing and due
 
     @property
     def is_climbing(self) -> bool:
@@ -181,6 +186,7 @@ class Run:
             noise=noise,
             chain=belief.chain if belief.held else tally.counts.chain(),
             drift=None if belief.drift is None else tally.drifts.estimate(),
+            is_cooling=self.cooling,
         )
 
 
@@ -284,10 +290,13 @@ class Inference:
         total, d = done.moments(), self.blank.model.n_actions
         if name == FREE:
             whole = total if total.everywhere is None else total.everywhere
-            self.scale = max(float(np.sum(whole.squares) / np.sum(whole.weight)), np.finfo(np.float64).tiny)
-            # Of local models each by itself.
-            left = solution.w
-            variance = _residual(done, left) / d
+            self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
+            if not SMALLEST_SCALE < self.scale < LARGEST_SCALE:
+                raise DataError(
+                    f"the actions' root mean square is {np.sqrt(self.scale):.3g}, and powers of that which the "
+                    "adaptive risk needs are no numbers any more: give the actions in another unit"
+                )
+            variance = _residual(done, solution.w) / d
         else:
             variance = 0.25 * self.scale / d
         self.starts[name] = Belief(solution.w, Noise(max(variance, self._floor)))
@@ -297,7 +306,8 @@ class Inference:
         drift = None if held == "free" or self.blank.model.n_actions == 1 else Drift()
         kinds = options.pop("kinds", ("action",))
         chain = Chain.held(held) if held else start.chain
-        belief = replace(start, held=held, drift=start.drift or drift, chain=chain)
+        cooling = options.get("cooling", True)
+        belief = replace(start, held=held, drift=start.drift or drift, chain=chain, is_cooling=cooling)
         self.runs.append(Run(name, kinds, belief, **options))
 
     def _advance(self, done: Accumulator) -> None:

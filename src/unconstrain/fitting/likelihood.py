@@ -100,13 +100,13 @@ class Whole:
             + (ranks - 1) * np.log(2 * np.pi * noise.across)
             + np.log(2 * np.pi * v)
         )
+        log[views.ranks < 0.5] = 0.0  # nothing is seen behind a projection that lets nothing through
         gradient = E / noise.across
         information = 1 / v
         if noise.speed:
-            # By the direction of p, `(u - (u·p̂) p̂) / q`, and by its length.
+            # By the direction of p, across which v is not the variance, and by its length.
             aside = E - along[:, None] * ahead
-            reach = (along + q) / noise.across - along / v
-            turning = np.divide(reach, q, out=np.zeros_like(q), where=q > 0)
+            turning = (1 + noise.speed * q * along / v) / noise.across
             slope = 2 * noise.speed * q
             lengthening = along / v + 0.5 * slope / v * (along**2 / v - 1)
             gradient = turning[:, None] * aside + lengthening[:, None] * ahead

@@ -123,12 +123,11 @@ def blurred(sphere: Sphere, variance: Floats) -> Density:
     d = sphere.out.shape[1]
     rho, R = sphere.from_center, sphere.radius
     kappa = rho * R / variance
-    log_bessel, ratio = scaled_bessel(d, kappa)
+    log_bessel, short = scaled_bessel(d, kappa)
     log = -0.5 * d * np.log(2 * np.pi * variance) - sphere.distance**2 / (2 * variance) + log_bessel
-    # 1 - ratio falls as 1/κ, so these differences keep their digits.
-    pulls_out, pulls_in = sphere.distance + R * (1 - ratio), -sphere.distance + rho * (1 - ratio)
+    pulls_out, pulls_in = sphere.distance + R * short, -sphere.distance + rho * short
     by_policy = (pulls_out[:, None] * sphere.out - pulls_in[:, None] * sphere.ahead) / (2 * variance[:, None])
-    squares = sphere.distance**2 + 2 * rho * R * (1 - ratio)
+    squares = sphere.distance**2 + 2 * rho * R * short
     return Density(log, by_policy, (squares / variance - d) / (2 * variance))
 
 
@@ -168,33 +167,35 @@ def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
     -------
     log_mean : ndarray of shape (N,)
         `log(Γ(d/2) (2/κ)^ν I_ν(κ)) - κ`, 0 at κ = 0.
-    ratio : ndarray of shape (N,)
-        `I_{ν+1}(κ) / I_ν(κ)`, the mean of m₁ where its density is proportional to `exp(κ m₁)`; 0 to 1.
+    short : ndarray of shape (N,)
+        By how much the mean of m₁, where its density is proportional to `exp(κ m₁)`, falls short of 1:
+        `1 - I_{ν+1}(κ) / I_ν(κ)`, 0 to 1. It is the derivative of `log_mean` with the sign turned, and it is returned
+        rather than the mean since it falls as 1/κ, and from a mean near 1 its digits could not be recovered.
     """
     from scipy.special import gammaln, ive
 
     nu = d / 2 - 1
     if d == 1:  # a sphere of two points
         decayed = np.exp(-2 * kappa)
-        return np.log1p(decayed) - np.log(2.0), (1 - decayed) / (1 + decayed)
-    log_mean, ratio = np.empty_like(kappa), np.empty_like(kappa)
+        return np.log1p(decayed) - np.log(2.0), 2 * decayed / (1 + decayed)
+    log_mean, short = np.empty_like(kappa), np.empty_like(kappa)
     least = 1e-4 * np.sqrt(d)
     with np.errstate(under="ignore", divide="ignore", invalid="ignore"):
         huge = kappa > FAR * max(nu, 1.0) ** 2
         bessel = ive(nu, np.where(huge, 1.0, kappa))
         fine = (bessel > 1e-290) & (kappa > least) & ~huge
         log_mean[fine] = gammaln(d / 2) + nu * np.log(2 / kappa[fine]) + np.log(bessel[fine])
-        ratio[fine] = ive(nu + 1, kappa[fine]) / bessel[fine]
+        short[fine] = 1 - ive(nu + 1, kappa[fine]) / bessel[fine]
     if not fine.all():
         rest = ~fine & ~huge
         value, slope = _series(nu, kappa[rest])
-        log_mean[rest], ratio[rest] = value - kappa[rest], slope
+        log_mean[rest], short[rest] = value - kappa[rest], 1 - slope
     if huge.any():
         k = kappa[huge]
-        first, second = _hankel(nu, k), _hankel(nu + 1, k)
-        log_mean[huge] = gammaln(d / 2) + nu * np.log(2 / k) - 0.5 * np.log(2 * np.pi * k) + np.log(first)
-        ratio[huge] = second / first
-    return log_mean, ratio
+        beyond, beyond_next = _hankel(nu, k), _hankel(nu + 1, k)
+        log_mean[huge] = gammaln(d / 2) + nu * np.log(2 / k) - 0.5 * np.log(2 * np.pi * k) + np.log1p(beyond)
+        short[huge] = (beyond - beyond_next) / (1 + beyond)
+    return log_mean, short
 
 
 def _series(nu: float, kappa: Floats) -> tuple[Floats, Floats]:
@@ -217,8 +218,8 @@ def _series(nu: float, kappa: Floats) -> tuple[Floats, Floats]:
 
 
 def _hankel(nu: float, kappa: Floats) -> Floats:
-    """Expand `sqrt(2πκ) exp(-κ) I_ν(κ)` in powers of 1/κ."""
-    total, term = np.ones_like(kappa), np.ones_like(kappa)
+    """Expand `sqrt(2πκ) exp(-κ) I_ν(κ) - 1` in powers of 1/κ."""
+    total, term = np.zeros_like(kappa), np.ones_like(kappa)
     for k in range(1, 6):
         term = term * -(4 * nu**2 - (2 * k - 1) ** 2) / (8 * k * kappa)
         total += term

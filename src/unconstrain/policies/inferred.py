@@ -1,0 +1,52 @@
+"""What a policy has inferred of its recordings, in sentences."""
+
+from unconstrain.fitting.inference import CONSTRAINED, FREE, NOTICEABLE
+from unconstrain.policies.base import Policy
+
+NOTHING_FOUND = "no contact was found in these recordings, so this is ordinary regression"
+NOTHING_MORE_FOUND = (
+    "beyond the constraints that are known no contact was found in these recordings: "
+    "other samples count as free"
+)
+IN_DOUBT = (
+    "warning: no contact could be told from what the model itself misses, so all samples count as free; but some of "
+    "them look constrained, so try a finer model (more centres, another width or another kind), which can tell"
+)
+
+
+def describe_inferred(policy: Policy) -> str:
+    """Say which samples were free, how noisy actions are, and how likely other assumptions are.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+
+    Returns
+    -------
+    str
+        A few lines; none for a policy that was learnt by another risk than the adaptive one.
+    """
+    if policy.solution_.belief is None:
+        return ""
+    lines = [
+        f"inferred: {policy.free_share_:.1%} of the samples were free",
+        f"noise: {policy.noise_:.3g} in the unit of the action",
+    ]
+    if policy.speed_noise_ > 0:
+        lines.append(f"noise of the speed: {policy.speed_noise_:.1%}")
+    likelihoods = policy.log_likelihoods_
+    if likelihoods:
+        chosen = next(iter(likelihoods))
+        others = [f"{likelihoods[name]:.4g} if {name}" for name in (FREE, CONSTRAINED) if name in likelihoods]
+        held_out = "held-out " if policy.alpha == "cv" else ""
+        lines.append(
+            f"log-likelihood of a {held_out}sample: {policy.log_likelihood_:.4g} as inferred, {', '.join(others)}"
+        )
+        if chosen == FREE:
+            # Constraints on every sample explain anything, so their likelihood is no ground for doubt.
+            rivals = [value for name, value in likelihoods.items() if name != CONSTRAINED]
+            is_in_doubt = max(rivals) - likelihoods[FREE] > NOTICEABLE
+            found = NOTHING_MORE_FOUND if policy.n_known_constraints_ else NOTHING_FOUND
+            lines.append(IN_DOUBT if is_in_doubt else found)
+    return "\n".join(lines)

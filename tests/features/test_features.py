@@ -117,7 +117,7 @@ def test_potential_features_need_fewer_data_than_full_ones():
         rng = np.random.default_rng(seed)
         X, unseen = rng.uniform(-1, 1, size=(60, 3)), rng.uniform(-0.9, 0.9, size=(500, 3))
         U = np.einsum("nij,nj->ni", uc.constraints.projection(rng.normal(size=(60, 2, 3))), policy(X))
-        learnt = uc.ParametricPolicy(features, alpha="cv").fit(X, U).predict(unseen)
+        learnt = uc.ParametricPolicy(features, risk="inconsistency", alpha="cv").fit(X, U).predict(unseen)
         return uc.metrics.normalized(
             uc.metrics.unconstrained_policy_error(policy(unseen), learnt), policy(unseen)
         )

@@ -213,7 +213,8 @@ class _Evidence:
             explained = np.sum(self.pulls / (self.values + decay[:, None]), axis=1)
             return float(self.n_targets * shrunk - np.sum(explained / noise))
 
-        size = float(np.sum(self.sizes) / np.sum(self.n)) or 1.0
+        # Squares of expanded log-likelihoods may add up to less than zero.
+        size = abs(float(np.sum(self.sizes) / np.sum(self.n))) or 1.0
         tried = np.log(np.geomspace(NARROWEST, WIDEST, N_TRIED) * size)
         best = int(np.clip(np.argmin([surprise(each) for each in tried]), 1, N_TRIED - 2))
         found = minimize_scalar(surprise, bounds=(tried[best - 1], tried[best + 1]), method="bounded")

@@ -110,7 +110,9 @@ class Batches:
             while len(batch.states):
                 cut = max(batch_rows - count, 0)
                 if self._is_along_episodes and batch.groups is not None:
-                    begins = np.concatenate([[batch.groups[0] != last], batch.groups[1:] != batch.groups[:-1]])
+                    begins = np.concatenate(
+                        [[batch.groups[0] != last], batch.groups[1:] != batch.groups[:-1]]
+                    )
                     later = np.flatnonzero(begins[cut:])
                     cut = cut + int(later[0]) if len(later) else len(batch.states) + 1
                 taken, ends = _rows(batch, slice(cut)), cut <= len(batch.states)

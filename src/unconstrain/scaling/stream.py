@@ -155,7 +155,7 @@ def fit_stream(
             else f"the same call with checkpoint {checkpoint} goes on from there"
         )
         raise KeyboardInterrupt(f"interrupted{which} after {rows}: {how}")
-    return finish(policy, accumulator, opened, reached.notes)
+    return finish(policy, accumulator, reached.notes, opened)
 
 
 def open_for(
@@ -227,7 +227,7 @@ def begin(
 
 
 def finish(
-    policy: PolicyT, accumulator: Accumulator, recordings: Recordings, notes: tuple[Note, ...]
+    policy: PolicyT, accumulator: Accumulator, notes: tuple[Note, ...], recordings: Recordings
 ) -> PolicyT:
     """Solve; only here does the policy change."""
     check_enough(accumulator.total)

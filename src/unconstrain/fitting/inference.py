@@ -185,7 +185,7 @@ class Inference:
     compared: list[Run] = field(default_factory=list)
     noises: list[Noise] = field(default_factory=list)
     likelihoods: dict[str, float] = field(default_factory=dict)
-    starts: dict[str, Any] = field(default_factory=dict)
+    starts: dict[str, Belief] = field(default_factory=dict)
     history: list[dict[str, Any]] = field(default_factory=list)
     scale: float = 1.0
     result: Accumulator | None = None

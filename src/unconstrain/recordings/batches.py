@@ -46,7 +46,7 @@ class Batches:
 
     def __init__(self, given: Iterable | Callable[[], Iterable], *, min_speed: float | None = None) -> None:
         self._given, self._min_speed = given, min_speed
-        self._is_along_episodes = False
+        self.is_along_episodes = False
         self._held: list[Samples] = []  # what was read of an iterator before its time
         self._rest: Iterator[Samples] | None = None
         self.repeatable = callable(given) or not isinstance(given, Iterator)
@@ -70,7 +70,7 @@ class Batches:
         An episode goes on in the next batch where that begins with the label that the one before ended with.
         """
         other = copy(self)
-        other._is_along_episodes = True
+        other.is_along_episodes = True
         return other
 
     def head(self) -> tuple[Array, Array]:
@@ -109,7 +109,7 @@ class Batches:
                 batch = _rows(batch, slice(skipped, None))
             while len(batch.states):
                 cut = max(batch_rows - count, 0)
-                if self._is_along_episodes and batch.groups is not None:
+                if self.is_along_episodes and batch.groups is not None:
                     begins = np.concatenate(
                         [[batch.groups[0] != last], batch.groups[1:] != batch.groups[:-1]]
                     )

@@ -88,8 +88,9 @@ def fit_stream(
     checkpoint_seconds : float
         Seconds between two of them.
     progress : bool or function, optional
-        True shows a bar with rows, rate and time left; a function is called with rows done and rows in all, in each pass
-        from the start. If it has a method `begin`, that is called before each pass of the adaptive risk with what it is.
+        True shows a bar with rows, rate and time left; a function is called with rows done and rows in all, anew in
+        each pass. If it has a method `begin`, that is called before each pass of the adaptive risk, with what it is
+        for.
     batch_rows : int
         How many samples are added up at a time: at most as many, or, where blocks hold whole episodes, at least.
     sample_rows : int

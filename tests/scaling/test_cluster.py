@@ -8,6 +8,7 @@ from sklearn.preprocessing import FunctionTransformer
 
 import unconstrain as uc
 from tests import written
+from tests.scaling import test_stream_adaptive as adaptive
 from tests.scaling import test_stream_known as known
 from tests.scaling.test_stream import COLUMNS, EPISODES, ROLES, TIME, U, X, assert_same_fit, policies, spoilt
 from unconstrain.scaling import cluster as distributed
@@ -198,3 +199,23 @@ def test_mistakes_are_told_in_one_sentence(client, monkeypatch):
         distributed.connected("local"),
     ):
         pass
+
+
+@pytest.mark.parametrize("derived", [False, True])
+@pytest.mark.parametrize("make", [adaptive.parametric, adaptive.local])
+def test_contact_is_inferred_in_as_many_passes_as_it_takes(tmp_path, client, make, derived):
+    time = adaptive.TIME.copy()
+    for label in np.unique(adaptive.EPISODES)[::3]:  # gaps, which make more episodes, dealt out on the spot
+        own = np.flatnonzero(label == adaptive.EPISODES)
+        time[own[len(own) // 2 :]] += 5.0
+    folder = written.write(
+        tmp_path / "parts", adaptive.X, adaptive.U, adaptive.EPISODES, time, [100, 101], row_group_size=20
+    )
+    columns = COLUMNS | ({"action": None, "time": "timestamp"} if derived else {})
+    whole = fit_stream(make(), uc.open(folder, **columns))
+    policy = distributed.fit(make(), uc.open(folder, **columns), client, part_rows=45, batch_rows=30)
+    adaptive.assert_same(policy, whole)
+    assert policy.history_[-1]["log_likelihood"] == pytest.approx(whole.history_[-1]["log_likelihood"])
+    if not derived:
+        adaptive.assert_same(policy, make().fit(adaptive.X, adaptive.U, groups=adaptive.EPISODES))
+        assert policy.resume().folds.fold_of == whole.resume().folds.fold_of

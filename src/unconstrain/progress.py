@@ -3,9 +3,28 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 Report = Callable[[int, int | None], None]
-"""Called with what is done and what there is in all, None where that is not known."""
+"""Called with what is done and what there is in all, None where that is not known.
+
+Where it has a method `begin`, that is called before each pass over the data with what the pass is for.
+"""
+
+
+def begin(report: Report, text: str) -> None:
+    """Say what is reported from now on, to reports that have a place for it.
+
+    Parameters
+    ----------
+    report : function
+        As `reporting` yields it.
+    text : str
+        What begins.
+    """
+    told = getattr(report, "begin", None)
+    if callable(told):
+        told(text)
 
 
 @contextmanager
@@ -33,23 +52,37 @@ def reporting(progress: bool | Report | None, unit: str = "rows") -> Iterator[Re
     from rich.console import Console  # rich takes a while to import, and is not always needed
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("learning"), BarColumn(), TextColumn("{task.fields[told]}"), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[told]}"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("", total=None, told="")
-        begun: int | None = None
+        yield _Bar(bar, unit)
 
-        def report(done: int, total: int | None) -> None:
-            nonlocal begun
-            begun = done if begun is None else begun
-            # What an earlier run did is no part of the rate of this one.
-            left = None if total is None else total - begun
-            bar.update(task, completed=done - begun, total=left)
-            speed = bar.tasks[0].speed
-            rate = f", {speed:,.0f} {unit}/s" if speed else ""
-            of = f" of {total:,}" if total else ""
-            bar.update(task, told=f"{done:,}{of} {unit}{rate}")
 
-        yield report
+class _Bar:
+    """A bar, of one pass after the other."""
+
+    def __init__(self, bar: Any, unit: str) -> None:
+        self._bar, self._unit = bar, unit
+        self._task = bar.add_task("learning", total=None, told="")
+        self._begun: int | None = None
+
+    def begin(self, text: str) -> None:
+        self._begun = None
+        self._bar.reset(self._task, total=None, description=text, told="")
+
+    def __call__(self, done: int, total: int | None) -> None:
+        self._begun = done if self._begun is None else self._begun
+        # What an earlier run did is no part of the rate of this one.
+        left = None if total is None else total - self._begun
+        self._bar.update(self._task, completed=done - self._begun, total=left)
+        speed = self._bar.tasks[0].speed
+        rate = f", {speed:,.0f} {self._unit}/s" if speed else ""
+        of = f" of {total:,}" if total else ""
+        self._bar.update(self._task, told=f"{done:,}{of} {self._unit}{rate}")
 
 
 @contextmanager

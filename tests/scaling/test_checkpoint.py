@@ -20,14 +20,14 @@ def test_a_disk_that_fills_up_is_warned_of_and_the_fit_is_finished(tmp_path, mon
         raise uc.errors.UnconstrainError("cannot write run.ckpt: no space left on device")
 
     monkeypatch.setattr("unconstrain.scaling.checkpoint.save_object", full)
-    policy = uc.ParametricPolicy(alpha=1e-6)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6)
     with pytest.warns(UserWarning, match="no space left on device; the fit goes on"):
         uc.fit_stream(policy, BATCHES, checkpoint=tmp_path / "run.ckpt")
     assert policy.n_samples_seen_ == len(X)
 
 
 def test_a_policy_that_cannot_be_saved_is_refused_before_the_work(tmp_path):
-    policy = uc.ParametricPolicy(FunctionTransformer(lambda states: states), alpha=1e-6)
+    policy = uc.ParametricPolicy(FunctionTransformer(lambda states: states), risk="inconsistency", alpha=1e-6)
     with pytest.raises(uc.errors.UnconstrainError, match="a lambda has no name"):
         uc.fit_stream(policy, BATCHES, checkpoint=tmp_path / "run.ckpt")
     assert not hasattr(policy, "model_")
@@ -36,12 +36,14 @@ def test_a_policy_that_cannot_be_saved_is_refused_before_the_work(tmp_path):
 
 def test_a_checkpoint_is_an_archive_of_its_own_kind(tmp_path):
     policy = uc.fit_stream(
-        uc.ParametricPolicy(FunctionTransformer(np.tanh), alpha=1e-6), BATCHES, checkpoint=tmp_path / "run"
+        uc.ParametricPolicy(FunctionTransformer(np.tanh), risk="inconsistency", alpha=1e-6),
+        BATCHES,
+        checkpoint=tmp_path / "run",
     )
     assert storage.kind_of(tmp_path / "run") is storage.Kind.CHECKPOINT
     with pytest.raises(uc.errors.ArchiveError, match="holds a checkpoint, not a policy"):
         uc.load_policy(tmp_path / "run")
-    again = uc.ParametricPolicy(FunctionTransformer(np.tanh), alpha=1e-6)
+    again = uc.ParametricPolicy(FunctionTransformer(np.tanh), risk="inconsistency", alpha=1e-6)
     uc.fit_stream(again, BATCHES, checkpoint=tmp_path / "run")  # trusts what the policy itself holds
     np.testing.assert_array_equal(again.predict(X), policy.predict(X))
 
@@ -49,7 +51,7 @@ def test_a_checkpoint_is_an_archive_of_its_own_kind(tmp_path):
 @pytest.mark.parametrize("spoil", ["weight", "shortest"])
 def test_a_checkpoint_whose_sums_are_none_is_damaged(tmp_path, spoil):
     path = tmp_path / "run"
-    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), BATCHES, checkpoint=path)
+    uc.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), BATCHES, checkpoint=path)
     tree, arrays = storage.read(path, storage.Kind.CHECKPOINT)
     if spoil == "weight":
         name = next(name for name in arrays if name.endswith("weight"))
@@ -60,4 +62,4 @@ def test_a_checkpoint_whose_sums_are_none_is_damaged(tmp_path, spoil):
         tree = json.loads(re.sub(r'"shortest": ([[{][^]}]*[]}]|[^,}]*)', '"shortest": "short"', text))
     storage.write(path, storage.Kind.CHECKPOINT, tree, arrays)
     with pytest.raises(uc.errors.ArchiveError, match=r"is damaged .*: delete it to start anew"):
-        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), BATCHES, checkpoint=path)
+        uc.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), BATCHES, checkpoint=path)

@@ -8,6 +8,7 @@ from sklearn.preprocessing import FunctionTransformer
 
 import unconstrain as uc
 from tests import written
+from tests.scaling import test_stream_adaptive as adaptive
 from tests.scaling import test_stream_known as known
 from tests.scaling.test_stream import COLUMNS, EPISODES, ROLES, TIME, U, X, assert_same_fit, policies, spoilt
 from unconstrain.scaling import cluster as distributed
@@ -59,9 +60,12 @@ def test_episodes_known_by_their_files(tmp_path, client):
     columns = {name: COLUMNS[name] for name in ("state", "action")}
     for cuts in ([], [100, 250, 400]):
         folder = written.write(tmp_path / str(len(cuts)), X, U, EPISODES, TIME, cuts, row_group_size=64)
-        whole = fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns))
+        whole = fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), uc.open(folder, **columns))
         policy = distributed.fit(
-            uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns), client, part_rows=100
+            uc.ParametricPolicy(risk="inconsistency", alpha="cv"),
+            uc.open(folder, **columns),
+            client,
+            part_rows=100,
         )
         assert_same_fit(policy, whole)
 
@@ -90,9 +94,12 @@ def test_forces_of_a_file_stay_together_where_files_are_episodes(tmp_path, clien
     folder = written.write(
         tmp_path / "parts", X, U, EPISODES, TIME, cuts, more=known.TOUCHED, row_group_size=64
     )
-    whole = fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns))
+    whole = fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), uc.open(folder, **columns))
     policy = distributed.fit(
-        uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns), client, part_rows=100
+        uc.ParametricPolicy(risk="inconsistency", alpha="cv"),
+        uc.open(folder, **columns),
+        client,
+        part_rows=100,
     )
     known.assert_same_known(policy, whole)
     assert policy.resume().folds.n_dealt == (len(cuts) + 1 if cuts else 5)
@@ -104,15 +111,20 @@ def test_what_counts_as_motion_does_not_depend_on_the_parts(tmp_path, client):
     actions[400] = 3e3
     folder = written.write(tmp_path / "parts", X, actions, EPISODES, TIME, [200])
     policy = distributed.fit(
-        uc.ParametricPolicy(alpha=1e-3), uc.open(folder, **COLUMNS), client, part_rows=50
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-3),
+        uc.open(folder, **COLUMNS),
+        client,
+        part_rows=50,
     )
-    assert_same_fit(policy, uc.ParametricPolicy(alpha=1e-3).fit(X, actions))
+    assert_same_fit(policy, uc.ParametricPolicy(risk="inconsistency", alpha=1e-3).fit(X, actions))
 
 
 def test_goes_on_where_a_fit_ended(tmp_path, client):
     today = written.write(tmp_path / "today", X[300:], U[300:], EPISODES[300:], TIME[300:], [100])
-    whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=EPISODES)
-    policy = uc.ParametricPolicy(alpha="cv").fit(X[:300], U[:300], groups=EPISODES[:300])
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(X, U, groups=EPISODES)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(
+        X[:300], U[:300], groups=EPISODES[:300]
+    )
     distributed.fit(policy, uc.open(today, **COLUMNS), client, part_rows=50, partial=True)
     assert_same_fit(policy, whole)
 
@@ -120,7 +132,9 @@ def test_goes_on_where_a_fit_ended(tmp_path, client):
 def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path, cluster, client):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200, 400], row_group_size=20)
     features = FunctionTransformer(written.slowly)
-    whole = uc.ParametricPolicy(FunctionTransformer(np.tanh), alpha="cv").fit(X, U, groups=EPISODES)
+    whole = uc.ParametricPolicy(FunctionTransformer(np.tanh), risk="inconsistency", alpha="cv").fit(
+        X, U, groups=EPISODES
+    )
     victim = cluster.workers[0].process.pid
     told = []
 
@@ -129,7 +143,7 @@ def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path, cluster, client
         if len(told) == 4:
             os.kill(victim, signal.SIGKILL)
 
-    policy = uc.ParametricPolicy(features, alpha="cv")
+    policy = uc.ParametricPolicy(features, risk="inconsistency", alpha="cv")
     distributed.fit(policy, uc.open(folder, **COLUMNS), client, part_rows=20, progress=kill)
     assert len(told) > 20  # most parts were still to come
     assert told[-1] == len(X)
@@ -146,7 +160,7 @@ def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path, cluster, client
     ],
 )
 def test_broken_parts_are_named(tmp_path, client, how, sentence):
-    policy = uc.ParametricPolicy(alpha=1e-6)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
         distributed.fit(policy, uc.open(spoilt(tmp_path / "parts", how), **COLUMNS), client, part_rows=50)
     assert "\n" not in str(caught.value)
@@ -173,7 +187,7 @@ def test_mistakes_about_constraints_are_told_in_one_sentence(tmp_path, client):
 
 def test_mistakes_are_told_in_one_sentence(client, monkeypatch):
     with pytest.raises(uc.errors.DataError, match="a cluster learns from files"):
-        distributed.fit(uc.ParametricPolicy(alpha=1e-6), [(X, U)], client)
+        distributed.fit(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), [(X, U)], client)
     with (
         pytest.raises(uc.errors.UnconstrainError, match=r"no Dask scheduler answered at tcp://127.0.0.1:1"),
         distributed.connected("tcp://127.0.0.1:1", timeout=0.5),
@@ -185,3 +199,23 @@ def test_mistakes_are_told_in_one_sentence(client, monkeypatch):
         distributed.connected("local"),
     ):
         pass
+
+
+@pytest.mark.parametrize("derived", [False, True])
+@pytest.mark.parametrize("make", [adaptive.parametric, adaptive.local])
+def test_contact_is_inferred_in_as_many_passes_as_it_takes(tmp_path, client, make, derived):
+    time = adaptive.TIME.copy()
+    for label in np.unique(adaptive.EPISODES)[::3]:  # gaps, which make more episodes, dealt out on the spot
+        own = np.flatnonzero(label == adaptive.EPISODES)
+        time[own[len(own) // 2 :]] += 5.0
+    folder = written.write(
+        tmp_path / "parts", adaptive.X, adaptive.U, adaptive.EPISODES, time, [100, 101], row_group_size=20
+    )
+    columns = COLUMNS | ({"action": None, "time": "timestamp"} if derived else {})
+    whole = fit_stream(make(), uc.open(folder, **columns))
+    policy = distributed.fit(make(), uc.open(folder, **columns), client, part_rows=45, batch_rows=30)
+    adaptive.assert_same(policy, whole)
+    assert policy.history_[-1]["log_likelihood"] == pytest.approx(whole.history_[-1]["log_likelihood"])
+    if not derived:
+        adaptive.assert_same(policy, make().fit(adaptive.X, adaptive.U, groups=adaptive.EPISODES))
+        assert policy.resume().folds.fold_of == whole.resume().folds.fold_of

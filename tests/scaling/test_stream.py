@@ -25,9 +25,9 @@ CENTERS = X[::97].copy()
 def policies(alpha="cv"):
     """Nothing in them is placed by the data."""
     return [
-        uc.ParametricPolicy(alpha=alpha),
-        uc.ParametricPolicy(uc.NormalizedRBF(centers=CENTERS, width=0.7), alpha=alpha),
-        uc.LocallyLinearPolicy(centers=CENTERS, width=0.7, alpha=alpha),
+        uc.ParametricPolicy(risk="inconsistency", alpha=alpha),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers=CENTERS, width=0.7), risk="inconsistency", alpha=alpha),
+        uc.LocallyLinearPolicy(centers=CENTERS, width=0.7, risk="inconsistency", alpha=alpha),
         uc.ParametricPolicy(risk="direct", alpha=alpha),
     ]
 
@@ -93,7 +93,9 @@ def test_batches_of_any_size_give_the_fit_of_all_at_once(policy):
 
 
 def test_actions_of_one_dimension_stay_flat():
-    policy = stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U[:, 0]), (X, U[:, 0])])
+    policy = stream.fit_stream(
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), [(X, U[:, 0]), (X, U[:, 0])]
+    )
     assert policy.predict(X).shape == (len(X),)
 
 
@@ -121,9 +123,14 @@ def test_gaps_make_episodes_as_loading_does(tmp_path):
         tmp_path / "one" / "part-0.parquet", columns["state"], time="timestamp", episode="episode_index"
     )
     assert demos.n_episodes > len(np.unique(EPISODES))
-    whole = uc.ParametricPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(
+        demos.states, demos.actions, groups=demos.episodes
+    )
     assert_same_fit(
-        stream.fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(folder, **columns), batch_rows=50), whole
+        stream.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha="cv"), uc.open(folder, **columns), batch_rows=50
+        ),
+        whole,
     )
 
 
@@ -134,47 +141,59 @@ def test_episodes_too_broken_to_differentiate_are_left_out(tmp_path):
     columns = COLUMNS | {"action": None, "time": "timestamp", "gap": 1.0}
     written.write(tmp_path / "one", X, U, EPISODES, time, [])
     demos = uc.load(tmp_path / "one" / "part-0.parquet", **columns)
-    whole = uc.ParametricPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(
+        demos.states, demos.actions, groups=demos.episodes
+    )
     assert len(demos) == len(X) - len(own)
     policy = stream.fit_stream(
-        uc.ParametricPolicy(alpha="cv"), uc.open(tmp_path / "one", **columns), batch_rows=1
+        uc.ParametricPolicy(risk="inconsistency", alpha="cv"),
+        uc.open(tmp_path / "one", **columns),
+        batch_rows=1,
     )
     assert_same_fit(policy, whole)
     written.write(tmp_path / "none", X[own], U[own], EPISODES[own], time[own], [])
     with pytest.raises(uc.errors.DataError, match="no episode has a fragment long enough"):
-        stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(tmp_path / "none", **columns))
+        stream.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(tmp_path / "none", **columns)
+        )
 
 
 def test_small_data_are_placed_as_fit_places_them(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200])
     for make in (
-        lambda: uc.LocallyLinearPolicy(n_centers=6, alpha=1e-6),
-        lambda: uc.ParametricPolicy(uc.NormalizedRBF(5), alpha=1e-6),
+        lambda: uc.LocallyLinearPolicy(n_centers=6, risk="inconsistency", alpha=1e-6),
+        lambda: uc.ParametricPolicy(uc.NormalizedRBF(5), risk="inconsistency", alpha=1e-6),
     ):
         assert_same_fit(stream.fit_stream(make(), uc.open(folder, **COLUMNS)), make().fit(X, U))
 
 
 def test_centres_lie_on_a_bounded_random_sample(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200, 400], row_group_size=40)
-    policy = uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6)
+    policy = uc.LocallyLinearPolicy(n_centers=8, risk="inconsistency", alpha=1e-6)
     stream.fit_stream(policy, uc.open(folder, **COLUMNS), sample_rows=50)
     rows = {tuple(x) for x in X}
     assert len(policy.centers_) == 8
     assert all(tuple(center) in rows for center in policy.centers_)
     again = stream.fit_stream(
-        uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6), uc.open(folder, **COLUMNS), sample_rows=50
+        uc.LocallyLinearPolicy(n_centers=8, risk="inconsistency", alpha=1e-6),
+        uc.open(folder, **COLUMNS),
+        sample_rows=50,
     )
     np.testing.assert_array_equal(again.centers_, policy.centers_)
     other = stream.fit_stream(
-        uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6),
+        uc.LocallyLinearPolicy(n_centers=8, risk="inconsistency", alpha=1e-6),
         uc.open(folder, **COLUMNS),
         sample_rows=50,
         random_state=1,
     )
     assert not np.array_equal(other.centers_, policy.centers_)
-    given = uc.LocallyLinearPolicy(centers=policy.centers_, width=policy.width_, alpha=1e-6).fit(X, U)
+    given = uc.LocallyLinearPolicy(
+        centers=policy.centers_, width=policy.width_, risk="inconsistency", alpha=1e-6
+    ).fit(X, U)
     assert_same_fit(policy, given)
-    first = stream.fit_stream(uc.LocallyLinearPolicy(n_centers=8, alpha=1e-6), iter([(X, U)]), sample_rows=50)
+    first = stream.fit_stream(
+        uc.LocallyLinearPolicy(n_centers=8, risk="inconsistency", alpha=1e-6), iter([(X, U)]), sample_rows=50
+    )
     rows = {tuple(x) for x in X[:50]}
     assert all(tuple(center) in rows for center in first.centers_)
 
@@ -183,12 +202,18 @@ def test_without_episode_column_files_are_episodes_and_one_file_is_cut_into_bloc
     columns = {name: COLUMNS[name] for name in ("state", "action")}
     several = written.write(tmp_path / "several", X, U, EPISODES, TIME, [100, 250, 400])
     groups = np.repeat([0, 1, 2, 3], np.diff([0, 100, 250, 400, len(X)]))
-    whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=groups)
-    assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(several, **columns)), whole)
-    one = written.write(tmp_path / "one", X, U, EPISODES, TIME, [])
-    whole = uc.ParametricPolicy(alpha="cv").fit(X, U)
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(X, U, groups=groups)
     assert_same_fit(
-        stream.fit_stream(uc.ParametricPolicy(alpha="cv"), uc.open(one, **columns), batch_rows=64), whole
+        stream.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), uc.open(several, **columns)),
+        whole,
+    )
+    one = written.write(tmp_path / "one", X, U, EPISODES, TIME, [])
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(X, U)
+    assert_same_fit(
+        stream.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha="cv"), uc.open(one, **columns), batch_rows=64
+        ),
+        whole,
     )
 
 
@@ -197,14 +222,16 @@ def test_what_uc_save_wrote_needs_no_columns(tmp_path):
     for i, part in enumerate((slice(0, 300), slice(300, None))):
         demos.select(part).save(tmp_path / f"{i}.parquet")
     loaded = uc.load([tmp_path / "0.parquet", tmp_path / "1.parquet"])
-    whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=loaded.episodes)
-    assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha="cv"), tmp_path), whole)
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(X, U, groups=loaded.episodes)
+    assert_same_fit(stream.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), tmp_path), whole)
 
 
 def test_file_uris_open_as_object_stores_do(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [200])
-    streamed = stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder.as_uri(), **COLUMNS))
-    assert_same_fit(streamed, uc.ParametricPolicy(alpha=1e-6).fit(X, U))
+    streamed = stream.fit_stream(
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(folder.as_uri(), **COLUMNS)
+    )
+    assert_same_fit(streamed, uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(X, U))
 
 
 @pytest.mark.parametrize("scale", [1e-30, 1.0, 1e18, 1e30])
@@ -214,9 +241,11 @@ def test_single_precision_is_that_of_the_files_and_of_nothing_else(tmp_path, sca
     pq.write_table(pa.table(table | {"episode_index": EPISODES}), tmp_path / "a.parquet")
     centers = CENTERS * scale
     for make in (
-        lambda: uc.ParametricPolicy(alpha="cv"),
-        lambda: uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=0.7 * scale), alpha="cv"),
-        lambda: uc.LocallyLinearPolicy(centers=centers, width=0.7 * scale, alpha="cv"),
+        lambda: uc.ParametricPolicy(risk="inconsistency", alpha="cv"),
+        lambda: uc.ParametricPolicy(
+            uc.NormalizedRBF(centers=centers, width=0.7 * scale), risk="inconsistency", alpha="cv"
+        ),
+        lambda: uc.LocallyLinearPolicy(centers=centers, width=0.7 * scale, risk="inconsistency", alpha="cv"),
         lambda: uc.ParametricPolicy(risk="direct", alpha="cv"),
         lambda: uc.LocallyLinearPolicy(centers=centers, width=0.7 * scale, risk="direct", alpha="cv"),
         lambda: uc.ParametricPolicy(uc.DecoupledFeatures(), risk="direct", alpha="cv"),
@@ -229,16 +258,18 @@ def test_single_precision_is_that_of_the_files_and_of_nothing_else(tmp_path, sca
 
 def test_columns_not_needed_are_not_read(tmp_path, columns_read):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
-    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, state=["x0"], action=["u1"]))
+    stream.fit_stream(
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(folder, state=["x0"], action=["u1"])
+    )
     assert columns_read[-1] == ["x0", "u1"]  # the first call looks at one row, to see what columns there are
 
 
 def test_yesterday_goes_on_today():
     yesterday, today = (X[:300], U[:300], EPISODES[:300]), (X[300:], U[300:], EPISODES[300:])
-    whole = uc.ParametricPolicy(alpha="cv").fit(X, U, groups=EPISODES)
-    policy = stream.fit_stream(uc.ParametricPolicy(alpha="cv"), [yesterday])
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(X, U, groups=EPISODES)
+    policy = stream.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), [yesterday])
     assert_same_fit(stream.fit_stream(policy, [today], partial=True), whole)
-    policy = stream.fit_stream(uc.ParametricPolicy(alpha="cv"), [yesterday])
+    policy = stream.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), [yesterday])
     assert_same_fit(policy.partial_fit(*today[:2], groups=today[2]), whole)
 
 
@@ -246,20 +277,28 @@ def test_what_counts_as_motion_does_not_depend_on_the_batches():
     actions = U.copy()
     actions[:200] = np.where(np.arange(200)[:, None] % 2, 1e-9, 1e-17)  # motion, and rounding beside it
     actions[400] = 3e3  # beside which all of that is rounding
-    whole = uc.ParametricPolicy(alpha=1e-3).fit(X, actions)
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha=1e-3).fit(X, actions)
     assert whole.n_zero_actions_ >= 200
     batches = [(X[i : i + 50], actions[i : i + 50]) for i in range(0, len(X), 50)]
     for source in (batches, lambda: iter(batches)):
-        assert_same_fit(stream.fit_stream(uc.ParametricPolicy(alpha=1e-3), source, batch_rows=50), whole)
+        assert_same_fit(
+            stream.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-3), source, batch_rows=50),
+            whole,
+        )
     with pytest.raises(uc.errors.DataError, match="was taken for motion before one of length"):
-        stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), iter(batches), batch_rows=50, sample_rows=100)
+        stream.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+            iter(batches),
+            batch_rows=50,
+            sample_rows=100,
+        )
 
 
 def test_progress_tells_rows_done_and_in_all(tmp_path, capsys):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
     told = []
     stream.fit_stream(
-        uc.ParametricPolicy(alpha=1e-6),
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
         uc.open(folder, **COLUMNS),
         progress=lambda *rows: told.append(rows),
         batch_rows=100,
@@ -267,7 +306,9 @@ def test_progress_tells_rows_done_and_in_all(tmp_path, capsys):
     assert told[0] == (0, len(X))
     assert told[-1] == (len(X), len(X))
     assert all(a[0] < b[0] for a, b in pairwise(told))
-    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS), progress=True)
+    stream.fit_stream(
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(folder, **COLUMNS), progress=True
+    )
     assert f"{len(X):,} of {len(X):,} rows" in capsys.readouterr().err
 
 
@@ -275,7 +316,7 @@ def test_a_checkpoint_that_cannot_be_written_is_refused_before_the_work(tmp_path
     told = []
     with pytest.raises(uc.errors.UnconstrainError, match="there is no folder"):
         stream.fit_stream(
-            uc.ParametricPolicy(alpha=1e-6),
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
             [(X, U)],
             checkpoint=tmp_path / "no" / "c.npz",
             progress=lambda *rows: told.append(rows),
@@ -368,15 +409,32 @@ def changed_in_place(folder):
 @pytest.mark.parametrize(
     ("other", "what"),
     [
-        (lambda f, o: (uc.ParametricPolicy(alpha=1.0), uc.open(f, **COLUMNS), {}), "policy"),
-        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), uc.open(o, **COLUMNS), {}), "source"),
-        (lambda f, o: (uc.ParametricPolicy(alpha=1e-6), changed_in_place(f), {}), "source"),
         (
-            lambda f, o: (uc.ParametricPolicy(alpha=1e-6), uc.open(f, **COLUMNS | {"state": ["x0"]}), {}),
+            lambda f, o: (uc.ParametricPolicy(risk="inconsistency", alpha=1.0), uc.open(f, **COLUMNS), {}),
+            "policy",
+        ),
+        (
+            lambda f, o: (uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(o, **COLUMNS), {}),
             "source",
         ),
         (
-            lambda f, o: (uc.ParametricPolicy(alpha=1e-6), uc.open(f, **COLUMNS), {"batch_rows": 10}),
+            lambda f, o: (uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), changed_in_place(f), {}),
+            "source",
+        ),
+        (
+            lambda f, o: (
+                uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+                uc.open(f, **COLUMNS | {"state": ["x0"]}),
+                {},
+            ),
+            "source",
+        ),
+        (
+            lambda f, o: (
+                uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+                uc.open(f, **COLUMNS),
+                {"batch_rows": 10},
+            ),
             "settings",
         ),
     ],
@@ -385,7 +443,9 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path, other, what):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
     another = written.write(tmp_path / "another", X[:90], U[:90], EPISODES[:90], TIME[:90], [])
     file = tmp_path / "run.npz"
-    stream.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS), checkpoint=file)
+    stream.fit_stream(
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(folder, **COLUMNS), checkpoint=file
+    )
     policy, recordings, settings = other(folder, another)
     with pytest.raises(uc.errors.UnconstrainError, match=f"checkpoint of another {what}"):
         stream.fit_stream(policy, recordings, **settings, checkpoint=file)
@@ -396,13 +456,17 @@ def test_a_checkpoint_that_is_none_is_refused(tmp_path):
     for content, sentence in [(b"hello", "holds no checkpoint saved by"), (None, "damaged")]:
         if content is None:
             stream.fit_stream(
-                uc.ParametricPolicy(), uc.open(folder, **COLUMNS), checkpoint=tmp_path / "ours.npz"
+                uc.ParametricPolicy(risk="inconsistency"),
+                uc.open(folder, **COLUMNS),
+                checkpoint=tmp_path / "ours.npz",
             )
             content = (tmp_path / "ours.npz").read_bytes()[:1000]
         (tmp_path / "run.npz").write_bytes(content)
         with pytest.raises(uc.errors.UnconstrainError, match=sentence):
             stream.fit_stream(
-                uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS), checkpoint=tmp_path / "run.npz"
+                uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+                uc.open(folder, **COLUMNS),
+                checkpoint=tmp_path / "run.npz",
             )
 
 
@@ -447,7 +511,7 @@ def spoilt(folder, how):
     ],
 )
 def test_broken_files_are_named(tmp_path, how, sentence):
-    policy = uc.ParametricPolicy(alpha=1e-6)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
         stream.fit_stream(policy, uc.open(spoilt(tmp_path / "parts", how), **COLUMNS))
     assert "\n" not in str(caught.value)
@@ -486,8 +550,16 @@ def test_broken_files_are_named(tmp_path, how, sentence):
         (lambda f, p: stream.fit_stream(p, [(X, U), (X * np.nan, U)]), "X of batch 1 contains NaN in row 0"),
         (lambda f, p: stream.fit_stream(p, [(X, 0 * U)]), "no action moves"),
         (lambda f, p: stream.fit_stream(p, [(X[:1], U[:1])]), "one sample"),
-        (lambda f, p: stream.fit_stream(uc.ParametricPolicy(alpha="cv"), [(X, U)]), "needs episodes"),
-        (lambda f, p: stream.fit_stream(uc.ParametricPolicy(alpha="cv"), [(X, U, 0 * TIME)]), "two episodes"),
+        (
+            lambda f, p: stream.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), [(X, U)]),
+            "needs episodes",
+        ),
+        (
+            lambda f, p: stream.fit_stream(
+                uc.ParametricPolicy(risk="inconsistency", alpha="cv"), [(X, U, 0 * TIME)]
+            ),
+            "two episodes",
+        ),
         (lambda f, p: stream.fit_stream("linear", [(X, U)]), "policy must be one of"),
     ],
 )
@@ -495,7 +567,7 @@ def test_mistakes_are_told_in_one_sentence(tmp_path, call, sentence):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [])
     (tmp_path / "empty").mkdir()
     with pytest.raises(uc.errors.UnconstrainError, match=sentence) as caught:
-        call(folder, uc.ParametricPolicy(alpha=1e-6))
+        call(folder, uc.ParametricPolicy(risk="inconsistency", alpha=1e-6))
     assert "\n" not in str(caught.value)
 
 
@@ -505,7 +577,7 @@ def test_an_episode_that_comes_back_cannot_be_differentiated(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, episodes, TIME, [])
     with pytest.raises(uc.errors.DataError, match=r"goes on at row .* sort it by episode"):
         stream.fit_stream(
-            uc.ParametricPolicy(alpha=1e-6),
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
             uc.open(folder, **COLUMNS | {"action": None, "time": "timestamp"}),
             batch_rows=50,
         )
@@ -516,7 +588,7 @@ def test_one_episode_is_refused_before_the_pass(tmp_path):
     told = []
     with pytest.raises(uc.errors.DataError, match="at least two episodes"):
         uc.fit_stream(
-            uc.ParametricPolicy(),
+            uc.ParametricPolicy(risk="inconsistency"),
             uc.open(folder, **COLUMNS),
             progress=lambda done, of: told.append(done),
         )

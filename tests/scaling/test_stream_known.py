@@ -31,9 +31,9 @@ DERIVED = {"state": COLUMNS["state"], "time": "timestamp"}
 
 def policies():
     return [
-        uc.ParametricPolicy(alpha="cv"),
-        uc.LocallyLinearPolicy(centers=CENTERS, width=0.7, alpha="cv"),
-        uc.ParametricPolicy(uc.NormalizedRBF(centers=CENTERS, width=0.7), alpha="cv"),
+        uc.ParametricPolicy(risk="inconsistency", alpha="cv"),
+        uc.LocallyLinearPolicy(centers=CENTERS, width=0.7, risk="inconsistency", alpha="cv"),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers=CENTERS, width=0.7), risk="inconsistency", alpha="cv"),
     ]
 
 
@@ -159,7 +159,7 @@ def test_projections_teach_a_stream_what_it_would_not_learn_without():
         ("without", (seen.states, seen.actions, seen.episodes)),
         ("with", (seen.states, seen.actions, seen.episodes, known)),
     ):
-        policy = uc.fit_stream(uc.ParametricPolicy(alpha="cv"), [batch])
+        policy = uc.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha="cv"), [batch])
         P = policy.predict(unseen.states)
         error[name] = risk.normalized(risk.unconstrained_policy_error(unseen.policy, P), unseen.policy)
     assert error["with"] < 1e-6
@@ -170,7 +170,7 @@ def test_columns_not_needed_are_not_read(tmp_path, columns_read):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     one = {"state": ["x0"], "action": ["u1"], "episode": "episode_index"}
     uc.fit_stream(
-        uc.LocallyLinearPolicy(n_centers=2, alpha=1e-6),
+        uc.LocallyLinearPolicy(n_centers=2, risk="inconsistency", alpha=1e-6),
         uc.open(folder, **one, force="f1", force_threshold=1.0, free="free"),
     )
     # A first row to see what there is, a sample to place centres on, and then all.
@@ -209,18 +209,24 @@ def test_an_interrupted_stream_goes_on(tmp_path, way):
 def test_a_checkpoint_belongs_to_what_was_known(tmp_path):
     folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [], more=TOUCHED)
     file = tmp_path / "run.npz"
-    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **FORCE), checkpoint=file)
+    uc.fit_stream(
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+        uc.open(folder, **COLUMNS, **FORCE),
+        checkpoint=file,
+    )
     others = [{}, FORCE | {"force_threshold": 2.5}, FORCE | {"force": ["f1", "f0", "f2"]}, WAYS["lists"]]
     for other in [*others, FORCE | {"free": "free"}]:
         with pytest.raises(uc.errors.UnconstrainError, match="checkpoint of another source"):
             uc.fit_stream(
-                uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **other), checkpoint=file
+                uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+                uc.open(folder, **COLUMNS, **other),
+                checkpoint=file,
             )
     file = tmp_path / "batches.npz"
-    uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U, None, N)], checkpoint=file)
+    uc.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), [(X, U, None, N)], checkpoint=file)
     for batch in ((X, U), (X, U, None, np.full_like(N, np.nan))):
         with pytest.raises(uc.errors.UnconstrainError, match="checkpoint of another source"):
-            uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [batch], checkpoint=file)
+            uc.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), [batch], checkpoint=file)
 
 
 # Mistakes
@@ -258,7 +264,7 @@ LONG = pa.array([np.eye(3).ravel()[: 8 if i == 207 else 9] for i in range(len(X)
     ],
 )
 def test_broken_files_are_named(tmp_path, name, values, way, sentence):
-    policy = uc.ParametricPolicy(alpha=1e-6)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6)
     with pytest.raises(uc.errors.DataError, match=sentence) as caught:
         uc.fit_stream(policy, uc.open(spoilt(tmp_path / "parts", name, values), **COLUMNS, **WAYS[way]))
     assert "\n" not in str(caught.value)
@@ -330,12 +336,14 @@ def test_mistakes_are_told_in_one_sentence(tmp_path, risk, source, options, sent
 def test_flags_may_be_booleans_or_say_so(tmp_path):
     free = np.array(TOUCHED["free"]) == 1
     whole = uc.fit_stream(
-        uc.ParametricPolicy(alpha=1e-6),
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
         uc.open(spoilt(tmp_path / "ones", "free", free * 1), **COLUMNS, **WAYS["free"]),
     )
     for name, flags in [("booleans", free), ("text", free.astype(str))]:
         folder = spoilt(tmp_path / name, "free", flags)
-        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS["free"]))
+        policy = uc.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS["free"])
+        )
         assert policy.n_known_constraints_ == whole.n_known_constraints_ == np.count_nonzero(free)
         np.testing.assert_array_equal(policy.predict(X), whole.predict(X))
         loaded = uc.load(folder / "part-0.parquet", **COLUMNS, free="free")
@@ -351,10 +359,12 @@ def test_a_file_may_know_no_projection(tmp_path, unknown):
     rows = slice(200) if unknown == 0 else slice(200, None)
     known = N.copy()
     known[rows] = np.nan
-    whole = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), [(X, U, EPISODES, known)])
+    whole = uc.fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), [(X, U, EPISODES, known)])
     for nothing in (pa.nulls(len(table)), pa.array([[]] * len(table), pa.list_(pa.float64()))):
         pq.write_table(table.set_column(at, "N", nothing), path)
-        policy = uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS["lists"]))
+        policy = uc.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS["lists"])
+        )
         assert policy.n_known_constraints_ == whole.n_known_constraints_
         np.testing.assert_allclose(policy.predict(X), whole.predict(X), rtol=1e-9)
 
@@ -366,7 +376,15 @@ def test_an_episode_that_comes_back_has_no_neighbours(tmp_path):
     with pytest.raises(
         uc.errors.DataError, match=r"goes on at row .* to filter the forces of a stream, sort it"
     ):
-        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **FORCE), batch_rows=50)
+        uc.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+            uc.open(folder, **COLUMNS, **FORCE),
+            batch_rows=50,
+        )
     # Flags and projections say what they say, wherever their samples are.
     for way in ("free", "lists"):
-        uc.fit_stream(uc.ParametricPolicy(alpha=1e-6), uc.open(folder, **COLUMNS, **WAYS[way]), batch_rows=50)
+        uc.fit_stream(
+            uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+            uc.open(folder, **COLUMNS, **WAYS[way]),
+            batch_rows=50,
+        )

@@ -84,7 +84,9 @@ def fit(
     named = [option for option, given in needs_memory.items() if given]
     is_stream = checkpoint is not None or cluster is not None
     if is_stream and named:
-        raise PolicyError(f"{named[0]} needs all data in memory, and a stream is read once: leave it out")
+        raise PolicyError(
+            f"{named[0]} needs all data in memory, and a stream is read block by block: leave it out"
+        )
     with working("reading"):
         opened = recorded.open()
         demos = opened.load() if named or (not is_stream and opened.fits_in_memory) else None

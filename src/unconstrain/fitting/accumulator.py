@@ -12,7 +12,7 @@ import numpy as np
 
 from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
-from unconstrain.fitting.contact import Belief, Tally, infer
+from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation, informative, observe, unknown
@@ -218,6 +218,8 @@ class Accumulator:
             rows = np.flatnonzero(samples.weights)
             samples, counted = samples.select(rows), counted[rows]
             fold = None if fold is None else fold[rows]
+        if not len(samples.states) and self.risk == "adaptive":
+            return counts
         if self.compared:
             return replace(
                 counts, tallies=tuple(self._compare(each, samples, fold) for each in self.compared)
@@ -414,6 +416,9 @@ class Accumulator:
         """Sum up the likelihood of samples under beliefs: one for all, or one for each fold."""
         if fold is None or len(beliefs) == 1 or not len(fold):
             return infer(self.model, beliefs[0], samples).tally
+        if samples.groups is not None:
+            # An episode that comes back is another, also where those in between are of other folds.
+            samples = samples._replace(groups=np.cumsum(episode_starts(samples)))
         tallies = []
         for k in np.unique(fold).tolist():
             rows = fold == k

@@ -16,6 +16,7 @@ explains anything, and where it is right inference finds it.
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,6 +29,7 @@ from unconstrain.fitting.contact import Belief
 from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
+from unconstrain.fitting.solve import EpisodeFolds
 
 COOLING = 0.8
 """By what the noise's deviation is lowered from one pass to the next, at most."""
@@ -206,7 +208,7 @@ class Inference:
     compared: list[Run] = field(default_factory=list)
     noises: list[Noise] = field(default_factory=list)
     likelihoods: dict[str, float] = field(default_factory=dict)
-    starts: dict[str, Any] = field(default_factory=dict)
+    starts: dict[str, Belief] = field(default_factory=dict)
     history: list[dict[str, Any]] = field(default_factory=list)
     scale: float = 1.0
     result: Accumulator | None = None
@@ -247,6 +249,8 @@ class Inference:
         done : Accumulator
             As `next_pass` returned it, but filled.
         """
+        # What counts as motion beside the longest action of all is known from the first pass on.
+        self.blank.longest = max(self.blank.longest, done.total.longest)
         if self.stage == "regression":
             self._start(done, FREE)
             self.stage = "inconsistency"
@@ -261,6 +265,28 @@ class Inference:
         else:
             done.record = Record(self.likelihoods, tuple(self.history))
             self.result = done
+            return
+        if done.folds is not None:
+            # The next pass deals all episodes out anew, and of millions the labels take memory.
+            done.folds = EpisodeFolds(done.folds.n_folds)
+
+    def copy(self) -> "Inference":
+        """Copy what `take` changes; sums are shared, which never change.
+
+        Returns
+        -------
+        Inference
+            At the same place.
+        """
+        return replace(
+            self,
+            runs=[copy(run) for run in self.runs],
+            compared=[copy(run) for run in self.compared],
+            noises=list(self.noises),
+            likelihoods=dict(self.likelihoods),
+            starts=dict(self.starts),
+            history=list(self.history),
+        )
 
     @property
     def description(self) -> str:

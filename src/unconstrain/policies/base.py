@@ -239,7 +239,9 @@ class Policy(RegressorMixin, BaseEstimator):
                 "this policy was saved without the sums it was solved from: save it with resumable=True to go on "
                 "learning, or to know how sure it is"
             )
-        return self.accumulator_.copy()
+        accumulator = self.accumulator_.copy()
+        accumulator.belief = self.solution_.belief
+        return accumulator
 
     def finish(self, accumulator: Accumulator, *, scalar_actions: bool = False) -> Self:
         """Solve what was added up elsewhere, and become that policy.

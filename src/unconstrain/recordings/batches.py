@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Generator, Iterable, Iterator
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -45,6 +46,7 @@ class Batches:
 
     def __init__(self, given: Iterable | Callable[[], Iterable], *, min_speed: float | None = None) -> None:
         self._given, self._min_speed = given, min_speed
+        self.is_along_episodes = False
         self._held: list[Samples] = []  # what was read of an iterator before its time
         self._rest: Iterator[Samples] | None = None
         self.repeatable = callable(given) or not isinstance(given, Iterator)
@@ -61,6 +63,15 @@ class Batches:
     def shape(self) -> tuple[int, int]:
         """The numbers of state and action dimensions."""
         return self._first.states.shape[1], self._first.actions.shape[1]
+
+    def along_episodes(self) -> "Batches":
+        """Return the same source, in whose blocks no samples of an episode that follow each other are torn apart.
+
+        An episode goes on in the next batch where that begins with the label that the one before ended with.
+        """
+        other = copy(self)
+        other.is_along_episodes = True
+        return other
 
     def head(self) -> tuple[Array, Array]:
         """Return states (N, n) and actions (N, d) of the first batch."""
@@ -84,20 +95,33 @@ class Batches:
     def blocks(
         self, batch_rows: int, start: int = 0, stop: int | None = None
     ) -> Generator[Block, None, None]:
-        """Read blocks of `batch_rows` samples from row `start`, where an earlier block ended."""
+        """Read blocks from row `start`, where an earlier block ended.
+
+        They have `batch_rows` samples, or along episodes at least as many.
+        """
         waiting: list[Samples] = []
         count, position = 0, 0
+        last: Any = None  # label of the sample before
         for batch in self._from_the_beginning():
             if position < start:  # read before
                 skipped = min(len(batch.states), start - position)
                 position += skipped
                 batch = _rows(batch, slice(skipped, None))
             while len(batch.states):
-                taken = _rows(batch, slice(batch_rows - count))
-                batch = _rows(batch, slice(batch_rows - count, None))
-                waiting.append(taken)
-                count += len(taken.states)
-                if count == batch_rows:
+                cut = max(batch_rows - count, 0)
+                if self.is_along_episodes and batch.groups is not None:
+                    begins = np.concatenate(
+                        [[batch.groups[0] != last], batch.groups[1:] != batch.groups[:-1]]
+                    )
+                    later = np.flatnonzero(begins[cut:])
+                    cut = cut + int(later[0]) if len(later) else len(batch.states) + 1
+                taken, ends = _rows(batch, slice(cut)), cut <= len(batch.states)
+                if len(taken.states):
+                    waiting.append(taken)
+                    count += len(taken.states)
+                    last = None if taken.groups is None else taken.groups[-1]
+                batch = _rows(batch, slice(cut, None))
+                if ends and count:
                     yield Block(position, position + count, partial(self._load, waiting))
                     waiting, position, count = [], position + count, 0
         if position < start:

@@ -124,6 +124,10 @@ class Source(Protocol):
         """Whether it is known only after preparation which episodes there are."""
         ...
 
+    def along_episodes(self) -> "Source":
+        """Return the same source, in whose blocks no samples of an episode that follow each other are torn apart."""
+        ...
+
     def head(self) -> tuple[NDArray[Any], NDArray[Any] | None]:
         """Read a few states (N, n) and actions (N, d); None for actions that are yet to be differentiated."""
         ...

@@ -80,6 +80,8 @@ class Recording:
     preparation : Preparation
     declared : Declared or None
         What the files say of themselves.
+    is_along_episodes : bool
+        Whether blocks end where episodes do even if samples are taken by themselves.
     """
 
     shown: str
@@ -92,6 +94,7 @@ class Recording:
     columns: Columns
     preparation: Preparation
     declared: Declared | None = None
+    is_along_episodes: bool = False
 
     @cached_property
     def n_rows(self) -> int:
@@ -201,6 +204,8 @@ class Recording:
                 yield Block(start, end, partial(load, every, start))
         elif whole:
             yield from self._whole_episodes(pieces, start, batch_rows, whole, load)
+        elif self.is_along_episodes:
+            yield from self._whole_episodes(pieces, start, batch_rows, None, load)
         else:
             yield from _blocks_of_rows(pieces, start, batch_rows, load)
 
@@ -479,27 +484,33 @@ class Recording:
         return tuple(note for note in notes if note.counts[0])
 
     def _whole_episodes(
-        self, pieces: Iterator[Piece], start: int, batch_rows: int, why: str, load: Any
+        self, pieces: Iterator[Piece], start: int, batch_rows: int, why: str | None, load: Any
     ) -> Generator[Block, None, None]:
-        """Yield blocks of whole episodes, of `batch_rows` rows or more."""
+        """Yield blocks of whole episodes, of `batch_rows` rows or more.
+
+        Without a reason `why` they have to be whole, an episode that comes back after others is taken for another.
+        """
         waiting: list[Piece] = []
         count = 0  # rows waiting
         current: Any = None
         here: set[Any] = set()  # episodes that wait
         gone: set[Any] = set()  # episodes of earlier blocks
         for piece in pieces:
-            values = self.labels([piece])
+            # A file without episodes is cut into some.
+            values = self.groups([piece], start + count) if why is None else self.labels([piece])
             changes = (np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()
             used = 0  # of the piece
             for at in changes if values[0] == current else [0, *changes]:
                 complete = count + at - used  # rows of episodes that have ended
-                if complete >= batch_rows and values[at] not in here:
+                if complete >= batch_rows and (why is None or values[at] not in here):
                     block = [*waiting, piece.slice(used, at - used)] if at > used else waiting
                     yield Block(start, start + complete, partial(load, block, start))
                     waiting, count, start, used = [], 0, start + complete, at
                     gone |= here
                     here = set()
                 current = values[at]
+                if why is None:
+                    continue
                 if current in gone:
                     place = piece.format.place(piece.first + at)
                     why = "time the samples of" if why == "time" else why

@@ -216,6 +216,15 @@ class Tables:
         every = [replace(each, roles=replace(each.roles, projections=())) for each in self.recordings]
         return Tables(tuple(every))
 
+    def along_episodes(self) -> "Tables":
+        """Return the same source, in whose blocks no samples of an episode that follow each other are torn apart."""
+        return Tables(tuple(replace(each, is_along_episodes=True) for each in self.recordings))
+
+    @property
+    def is_along_episodes(self) -> bool:
+        """Whether blocks end where episodes do."""
+        return any(each.is_along_episodes for each in self.recordings)
+
     def in_one_thread(self) -> "Tables":
         """Return the same source, of which no file is decoded by several threads."""
         every = [

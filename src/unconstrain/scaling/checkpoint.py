@@ -1,20 +1,24 @@
 """Where a stream stands, in a file: what was added up, what was placed, and up to which row.
 
-An archive that holds the accumulator with everything placed and its episodes dealt out to folds, and the sums so far.
+An archive that holds the accumulator with everything placed and its episodes dealt out to folds, and the sums so far;
+where contact is inferred, in several passes, also what the passes before found.
 """
 
 import hashlib
 import json
 import os
 import warnings
-from dataclasses import astuple, dataclass, fields
-from typing import Any
+from dataclasses import astuple, dataclass, fields, is_dataclass
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from sklearn.base import clone
 
 from unconstrain.errors import UnconstrainError
-from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.accumulator import Accumulator, Record
+from unconstrain.fitting.contact import Belief, Tally
+from unconstrain.fitting.inference import Inference
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
 from unconstrain.recordings.notes import Note
@@ -35,12 +39,15 @@ class Progress:
         The row to go on from.
     notes : tuple of Note
         What was found in the rows before.
+    inference : Inference, optional
+        What earlier passes found, and this one is for, where contact is inferred.
     """
 
     accumulator: Accumulator
     sums: Sums
     done: int
     notes: tuple[Note, ...] = ()
+    inference: Inference | None = None
 
 
 def identity(policy: Policy, source: str, settings: dict[str, Any], partial: bool) -> dict[str, str]:
@@ -123,24 +130,101 @@ def load(path: str | os.PathLike[str], belongs_to: dict[str, str], given: Policy
             f"{path} is the checkpoint of another {other[0]}: give another file, or delete this one to start anew"
         )
     notes = tuple(Note(*note) for note in found["notes"])
-    return Progress(found["accumulator"], found["sums"], found["done"], notes)
+    return Progress(found["accumulator"], found["sums"], found["done"], notes, found["inference"])
 
 
 def _check(found: dict[str, Any]) -> None:
-    kinds = {"accumulator": Accumulator, "sums": Sums, "done": int, "notes": list}
+    kinds: dict[str, Any] = {
+        "accumulator": Accumulator,
+        "sums": Sums,
+        "done": int,
+        "notes": list,
+        "inference": Inference | None,
+    }
     if set(found) != {"belongs_to", *kinds} or set(found["belongs_to"]) != {"policy", "source", "settings"}:
         raise TypeError("it holds other things than a checkpoint")
     wrong = [name for name, kind in kinds.items() if not isinstance(found[name], kind)]
     if wrong:
         raise TypeError(f"it holds another {wrong[0]}")
-    for part in (*found["sums"].moments, *found["accumulator"].total.moments):
+    _check_sums(found["sums"])
+    _check_accumulator(found["accumulator"], filled=found["inference"] is None)
+    if found["inference"] is not None:
+        _check_inference(found["inference"])
+    if not all(isinstance(note, tuple) and len(note) == len(fields(Note)) for note in found["notes"]):
+        raise TypeError("it holds notes that are none")
+
+
+def _check_sums(sums: Sums) -> None:
+    for part in (*sums.moments, *sums.judges):
         if part is not None and not all(
             np.isfinite(each).all() for each in (part.H, part.g, part.squares, part.weight)
         ):
             raise TypeError("its sums are not finite")
-    found["sums"] + Sums()  # raises for counts that are none
-    if not all(isinstance(note, tuple) and len(note) == len(fields(Note)) for note in found["notes"]):
-        raise TypeError("it holds notes that are none")
+    sums + Sums()  # raises for counts that are none
+    _check_types(sums.tallies, tuple[Tally, ...])
+
+
+def _check_accumulator(accumulator: Accumulator, *, filled: bool) -> None:
+    """Check an accumulator, and that it has a belief if something was added to it."""
+    _check_sums(accumulator.total)
+    _check_types(accumulator.belief, Belief | None)
+    _check_types(accumulator.record, Record)
+    _check_types(accumulator.compared, tuple[tuple[Belief, ...], ...])
+    if accumulator.risk == "adaptive" and filled and accumulator.belief is None:
+        raise TypeError("it holds sums of which nothing was believed")
+    model = accumulator.model
+    for belief in (accumulator.belief, *(each for several in accumulator.compared for each in several)):
+        if belief is not None:
+            model.evaluate(np.zeros((1, model.n_states)), belief.w)  # raises for parameters of another model
+
+
+def _check_inference(inference: Inference) -> None:
+    """Check where an inference stands: the types of what it holds, and that it knows how to go on."""
+    _check_types(inference, Inference)
+    if inference.result is not None:
+        raise TypeError("it holds an inference that has ended")
+    _check_accumulator(inference.blank, filled=False)
+    for run in (*inference.runs, *inference.compared):
+        if run.accepted is not None:
+            _check_accumulator(run.accepted, filled=True)
+            if len(run.accepted.total.tallies) != 1:
+                raise TypeError("it holds a run without tallies")
+    wanted = inference.next_pass()  # raises where it does not
+    assert wanted is not None
+    _check_accumulator(wanted, filled=False)
+    if not isinstance(inference.description, str):
+        raise TypeError("it holds an inference that cannot be described")
+
+
+def _check_types(value: Any, kind: Any, where: str = "it") -> None:
+    """Check a value by what its annotation says, down to the fields of dataclasses and what containers hold."""
+    of, inner = get_origin(kind), get_args(kind)
+    if kind is Any:
+        return
+    if of in (UnionType, Union):
+        (kind,) = [each for each in inner if each is not type(None)]
+        if value is not None:
+            _check_types(value, kind, where)
+        return
+    expected: Any = float | int if kind is float else np.ndarray if of is np.ndarray else of or kind
+    if not isinstance(value, expected) or (isinstance(value, bool) and kind is not bool):
+        raise TypeError(f"{where} holds a {type(value).__name__} where it takes a {kind}")
+    if isinstance(value, np.ndarray) and not (value.dtype == np.float64 and np.isfinite(value).all()):
+        raise TypeError(f"{where} holds numbers that are not finite")
+    if isinstance(value, dict):
+        for key, each in value.items():
+            _check_types(key, inner[0], where)
+            _check_types(each, inner[1], f"{where}.{key}")
+    elif isinstance(value, list | tuple):
+        kinds = inner if of is tuple and inner[-1] is not Ellipsis else (inner[0],) * len(value)
+        for each, its in zip(value, kinds, strict=True):
+            _check_types(each, its, where)
+    elif is_dataclass(kind):
+        hints = get_type_hints(kind)
+        if set(vars(value)) != set(hints):
+            raise TypeError(f"{where} is no {type(value).__name__}")
+        for name, its in hints.items():
+            _check_types(getattr(value, name), its, f"{where}.{name}")
 
 
 def _digest(value: Any) -> str:

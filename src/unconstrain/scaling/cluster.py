@@ -1,13 +1,13 @@
-"""The pass over a stream on a Dask cluster: workers turn parts of the data into moments, and only these travel.
+"""Passes over a stream on a Dask cluster: workers turn parts of the data into moments, and only these travel.
 
-A part is a run of row groups (of whole episodes, where states are differentiated or forces filtered). Its moments are
-P² + P numbers a fold, whatever its size; pairs of neighbours are added until one is left, on the workers. Which fold an
-episode belongs to is decided before, by a pass over the episode column alone, so that it is the fold `fit_stream` puts
-it in.
+A part is a run of row groups (of whole episodes, where contact is inferred, states are differentiated or forces
+filtered). Its moments are P² + P numbers a fold, whatever its size; pairs of neighbours are added until one is left, on
+the workers. Which fold an episode belongs to is decided before, by a pass over the episode column alone, so that it is
+the fold `fit_stream` puts it in. Data are divided once, however many passes it takes to infer contact.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,10 @@ from threadpoolctl import threadpool_limits
 
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.inference import Inference
 from unconstrain.fitting.solve import EpisodeFolds
 from unconstrain.progress import Report, reporting
+from unconstrain.progress import begin as begin_pass
 from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.source import BATCH_ROWS, Openable
 from unconstrain.recordings.tables import Tables
@@ -25,10 +27,12 @@ from unconstrain.scaling.stream import (
     SAMPLE_ROWS,
     PolicyT,
     begin,
+    check_enough,
     check_episodes,
     deal,
     finish,
     open_for,
+    source_for,
     to_learn_from,
 )
 
@@ -39,19 +43,24 @@ PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up lit
 
 @dataclass(frozen=True)
 class Part:
-    """Rows `start` to `stop`, and the folds of the episodes in them; None where episodes are dealt out on the spot."""
+    """Rows `start` to `stop`, and the folds of the episodes in them; None where episodes are dealt out on the spot.
+
+    Those are dealt out after `n_before` of other parts, once it is known how many there are.
+    """
 
     start: int
     stop: int
     fold_of: dict[Any, int] | None
+    n_before: int | None = None
 
 
 @dataclass(frozen=True)
 class Added:
-    """What consecutive parts add, and what was found in them."""
+    """What consecutive parts add, what was found in them, and how many episodes each of them dealt out."""
 
     accumulator: Accumulator
     notes: tuple[Note, ...] = ()
+    dealt: tuple[int, ...] = ()
 
 
 Setup = tuple[Accumulator, Tables, int]
@@ -107,21 +116,50 @@ def fit(
         As `fit_stream` does, and where the cluster fails.
     """
     opened = open_for(policy, recordings, batch_rows)
-    source = opened.source
-    if not isinstance(source, Tables):
+    if not isinstance(opened.source, Tables):
         raise DataError("a cluster learns from files: give a Parquet file or folder, or use fit_stream")
+    source = source_for(policy, opened.source, partial=partial)
+    assert isinstance(source, Tables)
     check_episodes(policy, source, partial=partial)
     accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
     rows = part_rows or max(batch_rows, -(-source.n_rows // (PARTS_PER_THREAD * threads)))
     parts = list(divide(source, rows, accumulator.folds))
     with reporting(progress) as report:
-        added = _added_up(client, accumulator.empty(), source, batch_rows, parts, report)
+
+        def add_up(empty: Accumulator, parts: list[Part]) -> Added:
+            return _added_up(client, empty, source, batch_rows, parts, report)
+
+        if accumulator.risk == "adaptive" and accumulator.belief is None:
+            return finish(policy, *_inferred(accumulator, parts, add_up, report), opened)
+        added = add_up(accumulator.empty(), parts)
         if added.accumulator.total.misjudged:
-            again = accumulator.empty(longest=added.accumulator.total.longest)
-            added = _added_up(client, again, source, batch_rows, parts, report)
+            added = add_up(accumulator.empty(longest=added.accumulator.total.longest), parts)
     accumulator.merge(added.accumulator)
-    return finish(policy, accumulator, opened, added.notes)
+    return finish(policy, accumulator, added.notes, opened)
+
+
+def _inferred(
+    blank: Accumulator, parts: list[Part], add_up: Callable[[Accumulator, list[Part]], Added], report: Report
+) -> tuple[Accumulator, tuple[Note, ...]]:
+    """Infer contact in as many passes as it takes; `blank` has the folds of the parts' episodes."""
+    inference = Inference(blank)
+    notes: tuple[Note, ...] = ()
+    while (wanted := inference.next_pass()) is not None:
+        begin_pass(report, inference.description)
+        added = add_up(wanted, parts)
+        check_enough(added.accumulator.total)
+        wanted.merge(added.accumulator)
+        if blank.folds is not None and parts[0].fold_of is None and parts[0].n_before is None:
+            # From now on episodes get their true fold on the spot, since beliefs that are compared hang on it.
+            before = np.cumsum([0, *added.dealt]).tolist()
+            parts = [replace(part, n_before=n) for part, n in zip(parts, before[:-1], strict=True)]
+            blank.folds.deal_unnamed(before[-1])
+        notes = added.notes
+        inference.take(wanted)
+    assert inference.result is not None
+    inference.result.folds = blank.folds
+    return inference.result, notes
 
 
 def divide(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
@@ -148,6 +186,11 @@ def divide(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Pa
             dealt = None if folds is None or source.relabels else _folds_of(source, start, stop, folds)
             yield Part(start, stop, dealt)
         return
+    if source.is_along_episodes:
+        bounds = list(_run_starts(source, rows))
+        for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):
+            yield Part(start, stop, None if folds is None else _folds_of(source, start, stop, folds))
+        return
     ends = np.cumsum(source.row_groups)
     start = 0
     for end in (int(end) for end in ends):
@@ -167,6 +210,19 @@ def _folds_of(source: Tables, start: int, stop: int, folds: EpisodeFolds) -> dic
         firsts = np.concatenate([[True], labels[1:] != labels[:-1]])
         own.update(zip(labels[firsts].tolist(), fold[firsts].tolist(), strict=True))
     return own
+
+
+def _run_starts(source: Tables, rows: int) -> Iterator[int]:
+    """Where parts begin that have `rows` rows or more, and end with samples of an episode that follow each other."""
+    yield 0
+    before: Any = None
+    last = 0
+    for labels, start in source.labels(0, source.n_rows):
+        firsts = start + np.flatnonzero(np.concatenate([[labels[0] != before], labels[1:] != labels[:-1]]))
+        before = labels[-1]
+        while len(firsts := firsts[firsts >= last + rows]):
+            last = int(firsts[0])
+            yield last
 
 
 def _episode_starts(source: Tables, rows: int) -> Iterator[int]:
@@ -241,6 +297,8 @@ def _setup(empty: Accumulator, source: Tables, batch_rows: int) -> Setup:
 def _sum_of_part(setup: Setup, part: Part) -> Added:
     empty, source, batch_rows = setup
     accumulator = empty.empty(part.fold_of)
+    if accumulator.folds is not None and part.n_before is not None:
+        accumulator.folds.deal_unnamed(part.n_before)
     notes: tuple[Note, ...] = ()
     with threadpool_limits(1, user_api="blas"):
         for block in source.blocks(batch_rows, part.start, part.stop):
@@ -248,10 +306,16 @@ def _sum_of_part(setup: Setup, part: Part) -> Added:
             samples = to_learn_from(accumulator, loaded)
             accumulator.include(accumulator.sums(samples, deal(accumulator, samples)))
             notes = combine((*notes, *loaded.notes))
-    return Added(accumulator.without_labels(), notes)
+    done = accumulator.without_labels()
+    if done.folds is None:
+        return Added(done, notes)
+    dealt = done.folds.n_dealt - (part.n_before or 0)
+    if part.n_before is not None:
+        done.folds = EpisodeFolds(done.folds.n_folds)  # whoever adds this to others need not rename folds
+    return Added(done, notes, (dealt,))
 
 
 def _sum_of_two(a: Added, b: Added) -> Added:
     total = a.accumulator.copy()  # what a task returned may be needed again
     total.merge(b.accumulator)
-    return Added(total, combine((*a.notes, *b.notes)))
+    return Added(total, combine((*a.notes, *b.notes)), a.dealt + b.dealt)

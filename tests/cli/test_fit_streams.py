@@ -27,7 +27,7 @@ def test_a_folder_is_read_as_a_stream(run, folder):
     )
     assert code == 0, err
     assert f"read: {len(X)} samples in {len(np.unique(EPISODES))} episodes" in out
-    assert "of observed motion explained" in out
+    assert "held-out log-likelihood of a sample" in out
     assert "not compared with ordinary regression" in out
     assert f"{len(X)} of {len(X)} rows" in err
     assert_same_fit(
@@ -55,7 +55,7 @@ def test_a_folder_is_read_at_once_if_it_fits_into_memory(run, folder, monkeypatc
     monkeypatch.setattr("unconstrain.recordings.source.available_memory", lambda: 1000.0)
     code, out, err = run("fit", folder, *COLUMNS, "--model", "linear", "--overwrite")
     assert code == 0, err
-    assert "held-out risk" in out
+    assert "held-out log-likelihood of a sample" in out
     assert "learnt by" not in out
     np.testing.assert_allclose(uc.load_policy("policy.skops").predict(X), at_once, atol=1e-9)
 

@@ -47,9 +47,7 @@ def test_it_is_the_sum_over_all_paths(seed, N, chain, size, has_kept):
     starts = rng.random(N) < 0.3
     starts[0] = True
     log_kept = rng.normal(size=N) * min(size, 10) if has_kept else np.zeros(N)
-    free, log, counts, kept = smooth(
-        log_free, log_constrained, starts, chain, log_kept if has_kept else None
-    )
+    free, log, counts, kept = smooth(log_free, log_constrained, starts, chain, log_kept if has_kept else None)
     expected = by_definition(log_free, log_constrained, starts, chain, log_kept)
     np.testing.assert_allclose(free, expected[0], atol=1e-10)
     assert log.sum() == pytest.approx(expected[1], abs=1e-9 * (1 + size * N))
@@ -123,7 +121,11 @@ def test_weights_count_samples_as_often(seed):
 
 
 def test_probabilities_come_from_counts_and_are_never_certain():
-    for states, changes in (((0, 0), np.zeros((2, 2))), ((1e6, 0), np.diag([1e6, 0])), ((0, 9), np.diag([0, 8]))):
+    for states, changes in (
+        ((0, 0), np.zeros((2, 2))),
+        ((1e6, 0), np.diag([1e6, 0])),
+        ((0, 9), np.diag([0, 8])),
+    ):
         chain = Counts(np.array(states, dtype=float), np.asarray(changes, dtype=float)).chain()
         assert 0 < chain.free_share < 1
         assert 0 < chain.leave_free < 1

@@ -78,7 +78,9 @@ def test_products_rows_and_pulls_of_an_expansion_agree(seed, d, known, is_judge)
         gradient = seen.pulls - np.einsum("nij,nj->ni", A, E)
         views, free = found.views, found.taken_whole[:, None]
         expected = free * views.whole.gradient + (1 - free) * views.constrained.gradient
-        np.testing.assert_allclose(gradient, belief.noise.across * expected, atol=1e-9 * (1 + np.abs(seen.pulls).max()))
+        np.testing.assert_allclose(
+            gradient, belief.noise.across * expected, atol=1e-9 * (1 + np.abs(seen.pulls).max())
+        )
         assert np.isfinite(error).all()
 
 
@@ -133,9 +135,7 @@ def test_the_judge_does_not_see_the_noise(d):
 
 @given(seeds, st.integers(2, 4), st.floats(-10, 1))
 def test_what_is_told_is_certain(seed, d, exponent):
-    model, belief, samples, told, P = problem(
-        seed, d, noise=Noise(10.0 ** (2 * exponent)), drift=Drift()
-    )
+    model, belief, samples, told, P = problem(seed, d, noise=Noise(10.0 ** (2 * exponent)), drift=Drift())
     is_free = np.einsum("nii->n", P) > d - 0.5
     for held in (None, "free", "constrained"):
         held_belief = Belief(belief.w, belief.noise, belief.chain, belief.drift, held=held)

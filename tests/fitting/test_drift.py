@@ -58,7 +58,9 @@ def test_relative_densities_average_to_one_over_the_sphere():
         P = np.tile(2 * np.eye(d)[0], (40_000, 1))
         m = rng.normal(size=P.shape)
         m /= np.linalg.norm(m, axis=1, keepdims=True)
-        steps = Steps.of(Sphere.of(P / 2 + m, P), np.full(len(P), 1e-3), np.arange(len(P)) == 0, Drift(0.2, 0.3))
+        steps = Steps.of(
+            Sphere.of(P / 2 + m, P), np.full(len(P), 1e-3), np.arange(len(P)) == 0, Drift(0.2, 0.3)
+        )
         density = np.exp(steps.log_kept[1:])
         assert abs(density.mean() - 1) < 6 * density.std() / np.sqrt(len(density))
 

@@ -41,7 +41,9 @@ def test_contact_and_noise_are_found_on_the_limit_cycle(free):
         assert policy.free_share_ == pytest.approx(was_free.mean(), abs=0.05)
         assert np.mean((policy.free_probability(demos) > 0.5) == was_free) >= 0.95
         assert error(policy, demos) < 1e-3
-        assert policy.score(demos.states, demos.actions, groups=demos.episodes) > 0.8  # short actions are mostly noise
+        assert (
+            policy.score(demos.states, demos.actions, groups=demos.episodes) > 0.8
+        )  # short actions are mostly noise
 
 
 @pytest.mark.parametrize("alpha", [1e-6, "cv"])

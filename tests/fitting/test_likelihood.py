@@ -33,7 +33,9 @@ def test_a_free_sample_is_normal_about_the_policy(seed, d, noise):
     U, P = rng.normal(size=(5, d)), rng.normal(size=(5, d))
     S = noise.across * np.eye(d) + noise.speed * P[:, :, None] * P[:, None]
     E = U - P
-    expected = -0.5 * (np.einsum("ni,nij,nj->n", E, np.linalg.inv(S), E) + np.linalg.slogdet(2 * np.pi * S)[1])
+    expected = -0.5 * (
+        np.einsum("ni,nij,nj->n", E, np.linalg.inv(S), E) + np.linalg.slogdet(2 * np.pi * S)[1]
+    )
     np.testing.assert_allclose(views(U, P, noise).whole.log, expected, rtol=1e-9, atol=1e-9)
 
 
@@ -42,7 +44,9 @@ def test_the_gradient_of_a_free_sample_is_its_slope(seed, d, noise):
     rng = np.random.default_rng(seed)
     U, P = rng.normal(size=(5, d)), rng.normal(size=(5, d))
     numeric = slope(lambda P: views(U, P, noise).whole.log, P)
-    np.testing.assert_allclose(views(U, P, noise).whole.gradient, numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max())
+    np.testing.assert_allclose(
+        views(U, P, noise).whole.gradient, numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max()
+    )
 
 
 @given(seeds, st.integers(1, 6), noises)
@@ -76,7 +80,9 @@ def test_the_gradient_of_a_constrained_sample_is_that_of_its_distance(seed, d, n
     bounded = -(d - 1) / 2 * (rho / (rho**2 + variance) - 1 / rho)
     expected = slope(log, P) + bounded[:, None] * seen.sphere.out
     got = seen.constrained.gradient
-    np.testing.assert_allclose(got, expected, rtol=1e-4, atol=1e-4 * (np.abs(expected).max() + (1 / rho).max()))
+    np.testing.assert_allclose(
+        got, expected, rtol=1e-4, atol=1e-4 * (np.abs(expected).max() + (1 / rho).max())
+    )
 
 
 @pytest.mark.parametrize("d", [2, 7])
@@ -101,9 +107,9 @@ def test_wherever_on_the_sphere_actions_lie_the_truth_is_not_pulled_away_from(d)
 
 @given(seeds, st.sampled_from([1, 2, 7]), st.floats(-6, 2))
 def test_the_square_of_a_constrained_sample_is_its_variance_on_average(seed, d, exponent):
-    """Over actions drawn from the marginal itself the score of the variance vanishes, at any ratio of noise to radius."""
+    """Over actions drawn from the marginal itself the score of the variance vanishes, whatever noise and radius are."""
     rng = np.random.default_rng(seed)
-    N, s = 20_000, 10.0 ** exponent
+    N, s = 20_000, 10.0**exponent
     P = np.tile(rng.normal(size=d), (N, 1))
     m = rng.normal(size=(N, d))
     m /= np.linalg.norm(m, axis=1, keepdims=True)

@@ -47,7 +47,9 @@ def test_the_evidence_is_the_likelihood_of_the_data():
 
 def test_noise_is_found_from_moments():
     X, U, _, _ = linear_problem(1, samples=4000)
-    assert np.sqrt(uc.ParametricPolicy(risk="inconsistency").fit(X, U).posterior().noise) == pytest.approx(0.1, rel=0.05)
+    assert np.sqrt(uc.ParametricPolicy(risk="inconsistency").fit(X, U).posterior().noise) == pytest.approx(
+        0.1, rel=0.05
+    )
 
 
 def test_ninety_percent_of_the_truth_lies_in_the_interval_where_the_model_is_right():
@@ -92,7 +94,9 @@ def test_covariance_is_that_of_policies_drawn_from_the_posterior(policy):
 def test_local_models_are_a_mixture_and_agree_with_a_single_one():
     X, U, _, _ = linear_problem(3)
     # λ of next to nothing: by itself each would choose its own, since one decays to zero and the other to all data.
-    one = uc.LocallyLinearPolicy(centers=np.zeros((1, 3)), width=1e4, alpha=1e-8, risk="inconsistency").fit(X, U)
+    one = uc.LocallyLinearPolicy(centers=np.zeros((1, 3)), width=1e4, alpha=1e-8, risk="inconsistency").fit(
+        X, U
+    )
     whole = uc.ParametricPolicy(alpha=1e-8, risk="inconsistency").fit(X, U)
     for of_local, of_whole in zip(
         one.predict(X, return_cov=True), whole.predict(X, return_cov=True), strict=True
@@ -118,7 +122,10 @@ def test_deviation_is_wide_where_the_data_are_silent():
 
 def test_streams_know_how_sure_they_are():
     X, U, _, _ = linear_problem(4)
-    whole, pieces = uc.ParametricPolicy(risk="inconsistency").fit(X, U), uc.ParametricPolicy(risk="inconsistency")
+    whole, pieces = (
+        uc.ParametricPolicy(risk="inconsistency").fit(X, U),
+        uc.ParametricPolicy(risk="inconsistency"),
+    )
     for part in (slice(150), slice(150, None)):
         pieces.partial_fit(X[part], U[part])
     np.testing.assert_allclose(

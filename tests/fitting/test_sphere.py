@@ -51,7 +51,9 @@ def test_neighbouring_orders_obey_the_recurrence(d, exponent):
         left = (here + above - here * above) / (1 - here)
         np.testing.assert_allclose(left, d / kappa, rtol=1e-6)
     else:  # a_ν = κ/d to first order, which 1 - s keeps to the rounding of 1
-        np.testing.assert_allclose((1 - here) * (d / kappa + (1 - above)), 1.0, atol=1e-10 + 1e-15 * d / kappa[0])
+        np.testing.assert_allclose(
+            (1 - here) * (d / kappa + (1 - above)), 1.0, atol=1e-10 + 1e-15 * d / kappa[0]
+        )
 
 
 @given(dimensions, logarithms)
@@ -124,7 +126,9 @@ def test_gradients_are_those_of_the_logarithm(seed, d, exponent):
 
     density = blurred(Sphere.of(U, P), variance)
     h = 1e-6 * min(1.0, 10**exponent)
-    numeric = np.stack([(log(P + h * e, variance) - log(P - h * e, variance)) / (2 * h) for e in np.eye(d)], 1)
+    numeric = np.stack(
+        [(log(P + h * e, variance) - log(P - h * e, variance)) / (2 * h) for e in np.eye(d)], 1
+    )
     scale = np.abs(density.log).max() + np.abs(numeric).max()
     np.testing.assert_allclose(density.by_policy, numeric, rtol=1e-4, atol=1e-5 * scale)
     h = 1e-5
@@ -165,7 +169,8 @@ def test_the_normal_is_the_slope_of_the_distance(seed, d):
     U, P = rng.normal(size=(5, d)), rng.normal(size=(5, d))
     h = 1e-6
     numeric = np.stack(
-        [(Sphere.of(U, P + h * e).distance - Sphere.of(U, P - h * e).distance) / (2 * h) for e in np.eye(d)], 1
+        [(Sphere.of(U, P + h * e).distance - Sphere.of(U, P - h * e).distance) / (2 * h) for e in np.eye(d)],
+        1,
     )
     np.testing.assert_allclose(Sphere.of(U, P).normal, numeric, atol=1e-4 if d == 1 else 1e-6, rtol=1e-4)
 

@@ -228,7 +228,9 @@ class Accumulator:
         moments = self._by_fold(samples, found.expand(), counted, fold)
         judges: tuple[Moments | None, ...] = ()
         if self.is_judged:
-            judges = self._by_fold(samples, found.judge(self.scale, 0.0 if self.belief.is_cooling else None), counted, fold)
+            judges = self._by_fold(
+                samples, found.judge(self.scale, 0.0 if self.belief.is_cooling else None), counted, fold
+            )
         return replace(counts, moments=moments, judges=judges, tallies=(found.tally,))
 
     def include(self, sums: Sums) -> None:

@@ -348,7 +348,11 @@ class Inference:
         return accepted.belief
 
     def _likeliest(self) -> Run:
-        """Choose the run whose likelihood is larger by more than `NOTICEABLE` than those of all before it."""
+        """Choose the run whose likelihood is larger by more than `NOTICEABLE` than those of all before it.
+
+        What a gain counts hangs on the evidence of the run that gains, not of the one it is compared with: residuals
+        of a wrong explanation are correlated because it is wrong.
+        """
         ranks = {name: rank for rank, name in enumerate((FREE, FROM_DIRECT, FROM_INCONSISTENCY, SPEED))}
         best, *others = sorted(
             (run for run in self.compared if run.name in ranks), key=lambda run: ranks[run.name]

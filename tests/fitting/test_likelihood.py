@@ -107,7 +107,7 @@ def test_wherever_on_the_sphere_actions_lie_the_truth_is_not_pulled_away_from(d)
 
 @given(seeds, st.sampled_from([1, 2, 7]), st.floats(-6, 2))
 def test_the_square_of_a_constrained_sample_is_its_variance_on_average(seed, d, exponent):
-    """Over actions drawn from the marginal itself the score of the variance vanishes, at any ratio of noise to radius."""
+    """Over actions drawn from the marginal itself the score of the variance vanishes, whatever noise and radius are."""
     rng = np.random.default_rng(seed)
     N, s = 20_000, 10.0**exponent
     P = np.tile(rng.normal(size=d), (N, 1))

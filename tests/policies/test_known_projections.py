@@ -121,7 +121,7 @@ def test_partial_fit_may_know_some_batches_and_not_others():
     X, U, N = demos.states, demos.actions, demos.projections.copy()
     N[60:] = np.nan
     # λ well above the rounding of H: what is compared is the policy, where the data hardly determine it too.
-    policy = uc.ParametricPolicy(alpha=1e-2)
+    policy = uc.ParametricPolicy(alpha=1e-2, risk="inconsistency")
     whole = clone(policy).fit(X, U, projections=N)
     pieces = clone(policy).partial_fit(X[:60], U[:60], projections=N[:60]).partial_fit(X[60:], U[60:])
     np.testing.assert_allclose(pieces.predict(X), whole.predict(X), atol=1e-9)

@@ -92,7 +92,9 @@ def test_a_resumable_policy_learns_on_as_the_saved_one(name, tmp_path):
 def test_without_its_moments_a_policy_says_how_to_keep_them(ask, name, tmp_path):
     POLICIES[name].save(tmp_path / "policy.skops")
     loaded = uc.load_policy(tmp_path / "policy.skops")
-    with pytest.raises(uc.errors.PolicyError, match=r"saved without the sums.*resumable=True"):
+    with pytest.raises(
+        uc.errors.PolicyError, match=r"saved without the sums.*resumable=True|give the recordings"
+    ):
         ask(loaded)
     assert isinstance(loaded.fit(X, -U, groups=GROUPS).moments_, list)
 
@@ -100,7 +102,9 @@ def test_without_its_moments_a_policy_says_how_to_keep_them(ask, name, tmp_path)
 def test_fifty_models_of_26_states_take_less_than_ten_megabytes(tmp_path):
     rng = np.random.default_rng(0)
     states = rng.normal(size=(400, 26))
-    policy = uc.LocallyLinearPolicy(n_centers=50, alpha=1e-3).fit(states, np.tanh(states))
+    policy = uc.LocallyLinearPolicy(n_centers=50, alpha=1e-3, risk="inconsistency").fit(
+        states, np.tanh(states)
+    )
     policy.save(tmp_path / "policy.skops")
     assert (tmp_path / "policy.skops").stat().st_size < 10 * 2**20
     policy.save(tmp_path / "policy.skops", resumable=True)
@@ -158,7 +162,7 @@ def test_a_lambda_cannot_be_saved_and_leaves_no_file(tmp_path):
 
 def test_a_file_does_not_say_on_how_many_processors_it_is_computed(tmp_path):
     union = make_union(PolynomialFeatures(1), PolynomialFeatures(2), n_jobs=2)
-    uc.ParametricPolicy(union).fit(X, U).save(tmp_path / "p.skops")
+    uc.ParametricPolicy(union, risk="direct").fit(X, U).save(tmp_path / "p.skops")
     assert uc.load_policy(tmp_path / "p.skops").features.n_jobs is None
 
 

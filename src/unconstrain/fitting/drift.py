@@ -28,7 +28,7 @@ does not quite fit change slowly, and must not pass for a constraint that does."
 RARELY = 1e-12
 
 BLURRIEST = 1e6
-"""Variance of a direction, in squared radians, that is as good as infinite: the sphere is far smaller than the noise."""
+"""Variance of a direction, in rad², that is as good as infinite: the noise is far larger than the sphere."""
 
 
 @dataclass(frozen=True)

@@ -392,7 +392,8 @@ class Inference:
         """Choose the run that beats "all free" most clearly, "all free" itself if none does.
 
         One that makes the policy implausibly large does not count, and one with more kinds of noise has to beat those
-        with fewer as clearly.
+        with fewer as clearly. What a gain counts hangs on the evidence of the run that gains, not of the one it is
+        compared with: residuals of a wrong explanation are correlated because it is wrong.
         """
         runs = {run.name: run for run in self.runs if run.name in self.likelihoods}
         largest = LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)

@@ -31,14 +31,7 @@ def joints(n_episodes=40, length=25, n=4, random_state=0):
     "demos",
     [
         pytest.param(draw_recordings(0)[0], id="half free, with noise"),
-        pytest.param(
-            DEMOS,
-            id="constrained, without noise",
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="inference calls all samples free where residuals follow each other: they do, for being bent",
-            ),
-        ),
+        pytest.param(DEMOS, id="constrained, without noise"),
     ],
 )
 def test_on_the_limit_cycle_the_choice_is_among_the_best_though_no_truth_is_seen(demos):

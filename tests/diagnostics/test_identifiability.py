@@ -22,11 +22,11 @@ from unconstrain.policies.unsure import Unsure
 def policies(X):
     centers, width = X[:3].copy(), 2.0 * float(np.std(X)) + 1e-3
     return [
-        uc.ParametricPolicy(alpha=1e-6),
-        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width), alpha=1e-6),
-        uc.ParametricPolicy(SplineTransformer(4), alpha=1e-6),
-        uc.LocallyLinearPolicy(centers=centers, width=width, alpha=1e-6),
-        uc.ParametricPolicy(uc.DecoupledFeatures(4), alpha=1e-6),
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers=centers, width=width), risk="inconsistency", alpha=1e-6),
+        uc.ParametricPolicy(SplineTransformer(4), risk="inconsistency", alpha=1e-6),
+        uc.LocallyLinearPolicy(centers=centers, width=width, risk="inconsistency", alpha=1e-6),
+        uc.ParametricPolicy(uc.DecoupledFeatures(4), risk="inconsistency", alpha=1e-6),
     ]
 
 
@@ -76,7 +76,9 @@ def test_moments_alone_tell_the_same(problem, weighted):
 def test_projections_show_more_and_their_moments_ask_for_the_recordings():
     demos = toy.demonstrate(3, random_state=0)
     N = uc.constraints.unconstrained(2, len(demos.states))
-    policy = uc.ParametricPolicy(alpha=1e-6).fit(demos.states, demos.policy, projections=N)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(
+        demos.states, demos.policy, projections=N
+    )
     report = uc.identifiability(policy, demos.states, demos.policy, projections=N)
     np.testing.assert_allclose(report.spectrum, 1.0)
     with pytest.raises(uc.errors.PolicyError, match="give the recordings"):
@@ -87,7 +89,7 @@ def test_demonstrations_bring_their_actions_episodes_and_projections():
     demos = toy.demonstrate(3, random_state=0)
     known = uc.constraints.unconstrained(2, len(demos.states))
     demos = replace(demos, projections=known, episode_labels=("a", "b", "c"))
-    policy = uc.ParametricPolicy(alpha=1e-6).fit(demos)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(demos)
     report = uc.identifiability(policy, demos)
     arrays = uc.identifiability(policy, demos.states, demos.actions, projections=known)
     np.testing.assert_array_equal(report.spectrum, arrays.spectrum)
@@ -109,9 +111,9 @@ def test_bounds_hold_for_policies_in_the_span(seed, d, off):
     if not np.any(U):
         return
     for policy in (
-        uc.ParametricPolicy(alpha=1e-6),
-        uc.ParametricPolicy(SplineTransformer(3, degree=1), alpha=1e-6),
-        uc.LocallyLinearPolicy(n_centers=3, alpha=1e-6),
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+        uc.ParametricPolicy(SplineTransformer(3, degree=1), risk="inconsistency", alpha=1e-6),
+        uc.LocallyLinearPolicy(n_centers=3, risk="inconsistency", alpha=1e-6),
     ):
         policy.fit(X, U)
         w = policy.solution_.w
@@ -120,7 +122,7 @@ def test_bounds_hold_for_policies_in_the_span(seed, d, off):
         counted = moving(U)
         error = uc.metrics.unconstrained_policy_error(Pi[counted], policy.predict(X)[counted])
         assert error <= report.bound * (1 + 1e-6) + 1e-12
-    policy = uc.ParametricPolicy(alpha=1e-6).fit(X, U)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(X, U)
     w = policy.solution_.w
     policy.solution_ = replace(policy.solution_, w=w + off * rng.normal(size=w.shape))
     report = uc.identifiability(policy, X, U)
@@ -140,7 +142,7 @@ def test_directions_never_seen_are_found_in_any_frame():
     R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     X = rng.normal(size=(300, 3))
     U = (rng.normal(size=(300, 3)) * [1.0, 0.5, 0.0]) @ R.T
-    report = uc.identifiability(uc.ParametricPolicy(alpha=1e-6).fit(X, U), X, U)
+    report = uc.identifiability(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(X, U), X, U)
     assert report.determined_share == pytest.approx(2 / 3)
     found = report.unseen_directions(X[:20])
     np.testing.assert_allclose(np.abs(found.directions[:, 0] @ R[:, 2]), 1.0, atol=1e-9)
@@ -155,7 +157,7 @@ def test_the_determined_share_orders_the_arms_constraints():
     shares = []
     for rows in ("2-4-6", "1-3-5", "4-5-6", "1-2-3"):
         demos = arm.demonstrate(rows, arm.PowerPolicy(1.8), 40, 50, random_state=0)
-        policy = uc.LocallyLinearPolicy(width=3**0.5).fit(demos.states, demos.actions)
+        policy = uc.LocallyLinearPolicy(width=3**0.5, risk="inconsistency").fit(demos.states, demos.actions)
         shares.append(uc.identifiability(policy).determined_share)
     assert shares[0] > 0.99
     assert shares == sorted(shares, reverse=True)
@@ -166,8 +168,8 @@ def test_the_determined_share_orders_the_arms_constraints():
 def test_advice_lowers_the_expected_error_as_it_says(criterion):
     demos = toy.demonstrate(4, random_state=0)
     for policy in (
-        uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.7), alpha=1e-6),
-        uc.LocallyLinearPolicy(alpha=1e-6),
+        uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.7), risk="inconsistency", alpha=1e-6),
+        uc.LocallyLinearPolicy(risk="inconsistency", alpha=1e-6),
     ):
         policy.fit(demos.states, demos.actions)
         report = uc.identifiability(policy, demos.states, demos.actions, groups=demos.episodes)
@@ -182,7 +184,7 @@ def test_advice_lowers_the_expected_error_as_it_says(criterion):
 
 def test_gains_are_what_a_recording_takes_away():
     demos = toy.demonstrate(4, noise=0.1, random_state=0)
-    policy = uc.ParametricPolicy(alpha=1e-6).fit(demos.states, demos.actions)
+    policy = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(demos.states, demos.actions)
     report = uc.identifiability(policy, demos.states, demos.actions)
     X, q = demos.states[:5], np.tile([[0.6, 0.8]], (5, 1))
     gains = report.gains(X, q)
@@ -197,7 +199,10 @@ def test_episodes_hold_all_that_is_determined_and_copies_can_go():
     demos = toy.demonstrate(6, random_state=0)
     X, U = np.vstack([demos.states, demos.states]), np.vstack([demos.actions, demos.actions])
     groups = np.concatenate([demos.episodes, demos.episodes + 6])
-    for policy in (uc.ParametricPolicy(alpha=1e-6), uc.LocallyLinearPolicy(n_centers=4, alpha=1e-6)):
+    for policy in (
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+        uc.LocallyLinearPolicy(n_centers=4, risk="inconsistency", alpha=1e-6),
+    ):
         report = uc.identifiability(policy.fit(X, U), X, U, groups=groups)
         found = report.contributions()
         counted = sum(np.sum(values / (values + report.threshold)) for values in report.spectra)
@@ -207,7 +212,9 @@ def test_episodes_hold_all_that_is_determined_and_copies_can_go():
 
 def test_the_report_speaks_in_the_users_words():
     demos = toy.demonstrate(3, random_state=0)
-    policy = uc.LocallyLinearPolicy(n_centers=3, alpha=1e-6).fit(demos.states, demos.actions)
+    policy = uc.LocallyLinearPolicy(n_centers=3, risk="inconsistency", alpha=1e-6).fit(
+        demos.states, demos.actions
+    )
     report = uc.identifiability(policy, demos.states, demos.actions, groups=demos.episodes)
     text = report.describe(["left", "up"], ["v_left", "v_up"])
     for part in (
@@ -241,9 +248,9 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
         assert part in told
     everywhere = toy.demonstrate(40, random_state=0)
     left = everywhere.select(everywhere.states[:, 0] < 0)
-    policy = uc.ParametricPolicy(uc.NormalizedRBF(centers="grid", width=0.5), alpha=1e-6).fit(
-        left.states, left.actions
-    )
+    policy = uc.ParametricPolicy(
+        uc.NormalizedRBF(centers="grid", width=0.5), risk="inconsistency", alpha=1e-6
+    ).fit(left.states, left.actions)
     policy.save(saved, resumable=True)
     move = ["rollout", saved, "--start=-0.7,0", "--steps", "400"]  # the cycle leads to the right
     paths = ["--out", str(tmp_path / "path.csv"), "--figure", str(tmp_path / "path.png")]
@@ -256,7 +263,7 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
 
 
 X = np.random.default_rng(0).normal(size=(20, 2))
-POLICY = uc.ParametricPolicy(alpha=1e-6).fit(X, X)
+POLICY = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(X, X)
 
 
 @pytest.mark.parametrize(
@@ -282,7 +289,9 @@ POLICY = uc.ParametricPolicy(alpha=1e-6).fit(X, X)
             "criterion must be one of",
         ),
         (
-            lambda: uc.identifiability(uc.ParametricPolicy(uc.DecoupledFeatures(5), alpha=1e-6).fit(X, X)),
+            lambda: uc.identifiability(
+                uc.ParametricPolicy(uc.DecoupledFeatures(5), risk="inconsistency", alpha=1e-6).fit(X, X)
+            ),
             "do not say what full observation",
         ),
     ],

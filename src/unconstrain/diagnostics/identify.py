@@ -76,7 +76,7 @@ def identifiability(
     >>> import numpy as np, unconstrain as uc
     >>> X = np.random.default_rng(0).normal(size=(100, 2))
     >>> U = -X * [1.0, 0.0]                                          # never moves along the second axis
-    >>> report = uc.identifiability(uc.ParametricPolicy().fit(X, U), X, U)
+    >>> report = uc.identifiability(uc.ParametricPolicy(risk="inconsistency").fit(X, U), X, U)
     >>> report.determined_share
     0.5
     >>> report.unseen_directions(X[:1]).directions[0, 0].round(6).tolist()

@@ -8,12 +8,13 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.demo
 	$(BIN)/unconstrain demo --out out/demo --overwrite
 
+# Two processes, a thread of BLAS each: with more they wait for each other.
 test: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2
 
 # Any number of inputs that nobody meant to give; those that fail are kept in out/fuzz.
 N ?= 1000

@@ -54,6 +54,8 @@ def map_shares(work: Callable[[Sequence[T]], R], pieces: Sequence[T]) -> list[R]
     list
         A result for each share.
     """
+    if len(pieces) < 2:
+        return [work(pieces)]
     controller = _blas()
     threads = min((library["num_threads"] for library in controller.info()), default=1)
     threads = min(threads, len(pieces))

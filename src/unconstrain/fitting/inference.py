@@ -66,6 +66,9 @@ NOTICEABLE = 0.015
 """Gain in held-out log-likelihood, per independent sample, for which contact is taken to be there. Residuals of a model
 that does not quite fit change slowly along an episode, and a hundred samples then tell no more than one."""
 
+DECISIVE = 10.0
+"""The same of all samples together: odds of 20,000 to one."""
+
 LARGEST_POLICY = 2.0
 """How many times √d larger than what is recorded a policy may be. Of a large enough one anything is left: near the
 origin its sphere passes by every action. Were but one direction left to move in, √d would be about right."""
@@ -396,18 +399,24 @@ class Inference:
         compared with: residuals of a wrong explanation are correlated because it is wrong.
         """
         runs = {run.name: run for run in self.runs if run.name in self.likelihoods}
-        largest = LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)
 
         def clearest(names: tuple[str, ...], best: Run) -> Run:
-            gains = {
-                name: (self.likelihoods[name] - self.likelihoods[best.name]) * runs[name].evidence
-                for name in names
-                if name in runs and runs[name].size <= largest
-            }
-            clear = [name for name, gain in gains.items() if gain > NOTICEABLE]
-            return runs[max(clear, key=lambda name: gains[name])] if clear else best
+            gains = {name: self._gain(runs[name], best) for name in names if name in runs}
+            name = max(gains, key=lambda name: gains[name], default=None)
+            return best if name is None or gains[name] <= 0 else runs[name]
 
         return clearest((SPEED,), clearest((FROM_DIRECT, FROM_INCONSISTENCY), runs[FREE]))
+
+    def _gain(self, run: Run, other: Run) -> float:
+        """Compute by how much a run explains more than another, per sample; 0 where that is not clear."""
+        assert run.accepted is not None
+        n_samples = run.accepted.total.tallies[0].n_samples
+        gain = self.likelihoods[run.name] - self.likelihoods[other.name]
+        if run.name == SPEED:  # what was held out may lie far off, and then a wider noise explains it
+            gain = min(gain, (run.log_likelihood - other.log_likelihood) / n_samples)
+        gain *= run.evidence
+        plausible = run.size <= LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)
+        return gain if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE else 0.0
 
     def _begin_comparison(self, runs: list[Run]) -> None:
         self.compared = list(runs)

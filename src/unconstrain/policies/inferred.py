@@ -1,6 +1,6 @@
 """What a policy has inferred of its recordings, in sentences."""
 
-from unconstrain.fitting.inference import CONSTRAINED, FREE, NOTICEABLE
+from unconstrain.fitting.inference import CONSTRAINED, FREE, SPEED
 from unconstrain.policies.base import Policy
 
 NOTHING_FOUND = "no contact was found in these recordings, so this is ordinary regression"
@@ -12,6 +12,9 @@ IN_DOUBT = (
     "warning: no contact could be told from what the model itself misses, so all samples count as free; but some of "
     "them look constrained, so try a finer model (more centres, another width or another kind), which can tell"
 )
+
+DOUBTFUL = 1.0
+"""Gain in log-likelihood of a sample, whatever it is worth, by which contact would explain more than none."""
 
 
 def describe_inferred(policy: Policy) -> str:
@@ -45,8 +48,8 @@ def describe_inferred(policy: Policy) -> str:
         )
         if chosen == FREE:
             # Constraints on every sample explain anything, so their likelihood is no ground for doubt.
-            rivals = [value for name, value in likelihoods.items() if name != CONSTRAINED]
-            is_in_doubt = max(rivals) - likelihoods[FREE] > NOTICEABLE
+            rivals = [value for name, value in likelihoods.items() if name not in (CONSTRAINED, SPEED)]
+            is_in_doubt = max(rivals) - likelihoods[FREE] > DOUBTFUL
             found = NOTHING_MORE_FOUND if policy.n_known_constraints_ else NOTHING_FOUND
             lines.append(IN_DOUBT if is_in_doubt else found)
     return "\n".join(lines)

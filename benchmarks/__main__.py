@@ -25,6 +25,7 @@ from benchmarks.ratio import Ratio
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "local-fit": fits.local_fit,
+    "adaptive-fit": fits.adaptive_fit,
     "parametric-fit": fits.parametric_fit,
     "wide-fit": fits.wide_fit,
     "lambda-path": fits.lambda_path,

@@ -49,15 +49,19 @@ def step_onnx_local() -> Ratio:
 
 
 def _linear():
-    return "linear, n=d=7", uc.ParametricPolicy(alpha=1e-6), 7
+    return "linear, n=d=7", uc.ParametricPolicy(alpha=1e-6, risk="inconsistency"), 7
 
 
 def _rbf():
-    return "36 RBFs, n=d=2", uc.ParametricPolicy(uc.NormalizedRBF(36, centers="grid"), alpha=1e-6), 2
+    return (
+        "36 RBFs, n=d=2",
+        uc.ParametricPolicy(uc.NormalizedRBF(36, centers="grid"), alpha=1e-6, risk="inconsistency"),
+        2,
+    )
 
 
 def _local():
-    return "50 local models, n=d=7", uc.LocallyLinearPolicy(n_centers=50, alpha=1e-6), 7
+    return "50 local models, n=d=7", uc.LocallyLinearPolicy(n_centers=50, alpha=1e-6, risk="inconsistency"), 7
 
 
 def _ratio(name: str, work: str, policy, n: int, reach: float, ready: Callable) -> Ratio:

@@ -94,7 +94,9 @@ def plot_sphere() -> Figure:
         (pi, colors.TRUE, "π, the pole", (24, -4)),
         (v, colors.SERIES[2], "v = Nπ", (4, 10)),
     ):
-        ax.annotate("", tip, (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0})
+        ax.annotate(
+            "", tip, (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0}
+        )
         ax.annotate(name, tip, aside, textcoords="offset points", color=color, fontsize=11)
     ax.plot(*np.array([v, pi]).T, ":", color=colors.SERIES[2], lw=1.6)
     ax.plot(*(pi / 2), "+", color=colors.RECORDED, ms=9)

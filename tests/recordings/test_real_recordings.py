@@ -74,7 +74,9 @@ def check_table(printed, heading, held_out, crossed):
         assert fitted(printed, name)["adaptive"] == fitted(printed, name)["direct"]
         assert "no contact could be told" in printed["fit", name]
     angles = [
-        numbers(printed["evaluate", name + way], "°")[-1] for name in crossed for way in ("", "-inconsistency")
+        numbers(printed["evaluate", name + way], "°")[-1]
+        for name in crossed
+        for way in ("", "-inconsistency")
     ]
     assert angles == pytest.approx(numbers(table, "°"), abs=0.5)
 
@@ -133,7 +135,9 @@ def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     flat, curved = (uc.load(place / f"{name}_circle.npz") for name in ("planer", "curve"))
     learnt, adaptive = (
         np.column_stack([path[axis] for axis in "xyz"])
-        for path in (np.genfromtxt(place / name, delimiter=",", names=True) for name in ("along.csv", "rollout.csv"))
+        for path in (
+            np.genfromtxt(place / name, delimiter=",", names=True) for name in ("along.csv", "rollout.csv")
+        )
     )
     surface = np.array([[0.42, 0.30, -0.86]])
     told = re.search(

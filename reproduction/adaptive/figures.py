@@ -70,3 +70,40 @@ def plot_contact(demos: Demonstrations, free: NDArray[np.bool_], inferred: NDArr
     panels[1].set_xlabel("y / m")
     figure.colorbar(points, ax=panels, shrink=0.6, label="probability that the barrier blocks a hand")
     return figure
+
+
+def plot_sphere() -> Figure:
+    """Plot where an action of one policy can lie in the plane: on the sphere, behind a projection, and at the pole."""
+    rng = np.random.default_rng(0)
+    pi, noise, row = np.array([2.0, 0.6]), 0.045, np.array([np.sin(0.55), -np.cos(0.55)])
+    v = pi - row * (row @ pi)
+    angle = np.linspace(0.0, 2 * np.pi, 200)
+    circle = pi / 2 + np.linalg.norm(pi) / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
+    # Three constraints, a stretch of an episode each, under which the action moves slowly over the sphere.
+    normals = np.concatenate([np.linspace(start, start + 0.25, 25) for start in (0.35, 1.3, 2.3)])
+    A = np.column_stack([np.cos(normals), np.sin(normals)])
+    bent = pi - A * (A @ pi)[:, None] + rng.normal(0.0, noise, A.shape)
+    free = pi + rng.normal(0.0, noise, (25, 2))
+
+    figure = Figure(figsize=(6.4, 4.6), layout="constrained")
+    ax = figure.subplots()
+    ax.plot(*circle.T, "--", color=colors.RECORDED, lw=1.2)
+    ax.plot(*bent.T, "s", ms=4, color=colors.DIRECT, mec="none", alpha=0.75, label="u, constrained")
+    ax.plot(*free.T, "o", ms=4.5, color=colors.LEARNT, mec="none", alpha=0.75, label="u, free")
+    for tip, color, name, aside in (
+        (pi, colors.TRUE, "π, the pole", (24, -4)),
+        (v, colors.SERIES[2], "v = Nπ", (4, 10)),
+    ):
+        ax.annotate(
+            "", tip, (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0}
+        )
+        ax.annotate(name, tip, aside, textcoords="offset points", color=color, fontsize=11)
+    ax.plot(*np.array([v, pi]).T, ":", color=colors.SERIES[2], lw=1.6)
+    ax.plot(*(pi / 2), "+", color=colors.RECORDED, ms=9)
+    ax.annotate("π/2", pi / 2, (6, -14), textcoords="offset points", color=colors.RECORDED)
+    ax.plot(0, 0, ".", color=colors.TRUE)
+    ax.annotate("0", (0, 0), (-12, -4), textcoords="offset points")
+    ax.set_aspect("equal")
+    ax.set(xlabel="u1", ylabel="u2", xlim=(-0.25, 2.85), ylim=(-0.9, 1.5))
+    ax.legend(loc="lower right", frameon=False)
+    return figure

@@ -1,4 +1,4 @@
-"""The figures of docs/method.md, and those of the README that come from there."""
+"""The figures of docs/method.md, and those of the README that come from docs/adaptive.md."""
 
 import contextlib
 import io
@@ -10,16 +10,18 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+ADAPTIVE = (ROOT / "docs" / "adaptive.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def rows(text):
-    """The numbers of a table's last two columns, row by row."""
-    cells = [line.strip("|").split("|") for line in text.splitlines() if line.startswith("|")][2:]
-    return [[float(cell) for cell in row[-2:]] for row in cells]
+def rows(table, keys, columns):
+    """The numbers of a table's columns, by the first cells of each row."""
+    head, _, *lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    places = [head.index(column) for column in columns]
+    return {tuple(line[:keys]): [float(line[place]) for place in places] for line in lines}
 
 
-def test_both_pages_state_what_the_code_prints():
+def test_the_page_states_what_the_code_prints():
     _, code = BLOCKS
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
@@ -28,16 +30,18 @@ def test_both_pages_state_what_the_code_prints():
         [float(number) for number in re.findall(r"'([\d.e-]+)'", line)]
         for line in said.getvalue().splitlines()
     ]
-    table = PAGE[PAGE.index("| 40 movements |") :].split("\n\n")[0]
+    table = PAGE[PAGE.index("| free share | direct |") :].split("\n\n")[0]
+    told = rows(table, 1, ("direct", "inconsistency", "adaptive"))
     # The last digits hang on the library of linear algebra.
-    np.testing.assert_allclose(np.log(rows(table)), np.log(printed), atol=np.log(1.5))
+    np.testing.assert_allclose(np.log(list(told.values())), np.log(printed), atol=np.log(1.5))
 
-    short = README[README.index("| noise of the actions |") :].split("\n\n")[0]
-    cells = [line.strip("|").split("|")[1:] for line in short.splitlines()[2:]]
-    free, constrained = rows(table)[3:], rows(table)[:3]
-    assert [[float(cell) for cell in row] for row in cells] == [
-        a + b for a, b in zip(constrained, free, strict=True)
-    ]
+
+def test_the_readme_states_what_the_page_on_inference_does():
+    ways = ("direct", "inconsistency", "adaptive", "told")
+    short = rows(README[README.index("| free share |") :].split("\n\n")[0], 2, ways)
+    whole = rows(ADAPTIVE[ADAPTIVE.index("| free share |") :].split("\n\n")[0], 2, ways)
+    assert len(short) == 9
+    assert short == {key: whole[key] for key in short}
 
 
 def test_a_feature_map_of_ones_own_finds_the_parameters():

@@ -36,11 +36,18 @@ def printed(tmp_path_factory):
 def test_the_commands_print_the_shares_that_the_text_states(printed):
     shares = {name: re.findall(r"([\d.]+)%", output) for name, output in printed[0].items()}
     told = [float(share) for share in re.findall(r"([\d.]+) %", FIVE_MINUTES)]
-    found = [float(shares["fit"][0]), float(shares["fit"][1]), float(shares["evaluate"][-1])]
+    found = [float(share) for share in (*shares["fit"][:4], shares["evaluate"][-1])]
+    # What was free, then the shares explained: adaptive, inconsistency, direct, and on the others.
     assert found == pytest.approx(told, abs=0.1)
+    assert f"noise: {re.search(r'deviation of ([0-9.]+)', FIVE_MINUTES)[1]} in the unit" in printed[0]["fit"]
     assert "x2 0.2" in printed[0]["rollout"]
     for picture in ("circle.png", "blocked.png", "known.png"):
         assert (printed[1] / picture).exists()
+
+
+def test_the_first_table_is_the_demos(printed):
+    table = (printed[1] / "demo" / "table.md").read_text(encoding="utf-8")
+    assert table in README
 
 
 def test_python_does_what_the_commands_do(printed):
@@ -49,6 +56,8 @@ def test_python_does_what_the_commands_do(printed):
     with contextlib.chdir(printed[1]), contextlib.redirect_stdout(io.StringIO()):
         exec(code, names)
     policy, others, path = names["policy"], names["others"], names["path"]
-    assert f"{policy.score(others.states, others.actions):.2%}" in printed[0]["evaluate"]
+    assert (
+        f"{policy.score(others.states, others.actions, groups=others.episodes):.2%}" in printed[0]["evaluate"]
+    )
     written = np.genfromtxt(printed[1] / "blocked.csv", delimiter=",", names=True)
     np.testing.assert_allclose(path.states[-1], [written["x1"][-1], written["x2"][-1]], atol=1e-6)

@@ -13,7 +13,6 @@ import pytest
 import unconstrain as uc
 from unconstrain.cli import main
 from unconstrain.metrics import explained
-from unconstrain.simulation import rollout
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -24,11 +23,11 @@ pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings are no
 
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
-    """What the page's commands print, in order, and the folder they ran in."""
+    """What the page's commands print, by command and policy, and the folder they ran in."""
     place = tmp_path_factory.mktemp("walk")
     for name in ("planer_circle.csv", "curve_circle.csv"):
         (place / name).symlink_to(DATA / name)
-    outputs = []
+    outputs = {}
     # In one process, to import everything once.
     with pytest.MonkeyPatch.context() as patch, contextlib.chdir(place):
         patch.setenv("COLUMNS", "300")
@@ -44,58 +43,109 @@ def printed(tmp_path_factory):
                     main()
                 assert not end.value.code
                 said.flush()
-                outputs.append(said.buffer.getvalue().decode())
+                words = sys.argv
+                policy = words[words.index("--out") + 1] if words[1] == "fit" else words[2]
+                outputs[words[1], policy.removesuffix(".skops")] = said.buffer.getvalue().decode()
     assert (place / "curve.png").exists()
     assert (place / "circle.png").exists()
     return outputs, place
 
 
-def shares(text):
-    return [float(share) for share in re.findall(r"(-?[\d.]+) ?%", text)]
+RISKS = ("adaptive", "inconsistency", "direct")
 
 
-def found(printed):
-    """Shares in the order of the page's tables: each surface held out, then each policy on the other surface."""
-    _, flat, flat_on_curve, _, direct_on_curve, curve, curve_on_flat, _, direct_on_flat = printed
-    crossed = (flat_on_curve, direct_on_curve, curve_on_flat, direct_on_flat)
-    return [*shares(flat)[:2], *shares(curve)[:2], *(shares(each)[-1] for each in crossed)]
+def numbers(text, unit):
+    return [float(number) for number in re.findall(rf"(-?[\d.]+) ?{unit}", text)]
+
+
+def fitted(printed, policy):
+    """Held-out error and share explained of each risk, as `fit` prints them."""
+    text = printed["fit", policy]
+    rows = {risk: re.search(rf"│ {risk}\b[^│]*│ ([-\d.e]+) *│ (-?[\d.]+)%", text) for risk in RISKS}
+    return {risk: [float(number) for number in row.groups()] for risk, row in rows.items()}
+
+
+def check_table(printed, heading, held_out, crossed):
+    """Compare the table below a heading with what was printed."""
+    table = PAGE[PAGE.index(heading) :].split("\n\n")[0]
+    found = [fitted(printed, name)[risk][1] for name in held_out for risk in RISKS[:2]]
+    assert found == pytest.approx(numbers(table, "%"), abs=0.5)
+    for name in held_out:
+        assert fitted(printed, name)["adaptive"] == fitted(printed, name)["direct"]
+        assert "no contact could be told" in printed["fit", name]
+    angles = [
+        numbers(printed["evaluate", name + way], "°")[-1]
+        for name in crossed
+        for way in ("", "-inconsistency")
+    ]
+    assert angles == pytest.approx(numbers(table, "°"), abs=0.5)
 
 
 def test_the_page_states_what_its_commands_print(printed):
-    both = printed[0][0]
+    both = printed[0]["fit", "both"]
     assert "read: 6021 samples" in both
     assert "zero actions: 0" in both
-    assert "λ: 2.16" in both
+    assert "λ: 10 " in both
+    assert "no contact could be told" in both
     told = re.search(
-        r"explains ([\d.]+) % of the held-out motion;\s+ordinary regression explains ([\d.]+) %", PAGE
+        r"explains ([\d.]+) % of the held-out motion.*?inconsistency, by the same measure, explains (-[\d.]+) %",
+        PAGE,
+        flags=re.DOTALL,
     )
-    assert shares(both)[:2] == pytest.approx([float(share) for share in told.groups()], abs=0.05)
-    table = shares(PAGE[PAGE.index("| motion explained") : PAGE.index("## Does")])
-    assert found(printed[0][:9]) == pytest.approx(table, abs=0.5)
+    found = fitted(printed[0], "both")
+    assert [found["adaptive"][1], found["inconsistency"][1]] == pytest.approx(
+        [float(share) for share in told.groups()], abs=0.05
+    )
+    check_table(printed[0], "| | adaptive, which", ("flat", "curve"), ("flat", "curve"))
 
 
 def test_relative_to_its_centre_the_movement_circles(printed):
-    table = shares(PAGE[PAGE.index("| motion around") : PAGE.index("**Now the field")])
-    assert [*shares(printed[0][9])[:2], *found(printed[0][9:18])] == pytest.approx(table, abs=0.5)
+    one_by_one = ("flat-circle", "curve-circle")
+    check_table(printed[0], "| motion around", ("circle", *one_by_one), one_by_one)
+
+
+def test_a_finer_model_is_misled_as_the_page_says(printed):
+    page = PAGE[PAGE.index("## Where inference is misled") :]
+    text, found = printed[0]["fit", "fine"], fitted(printed[0], "fine")
+    assert numbers(text, "% of the samples were free") == pytest.approx(
+        numbers(page, "% of the samples were free"), abs=1.0
+    )
+    told = re.search(r"falls to ([\d.]+), from ([\d.]+) for", page)
+    errors = [found["adaptive"][0], found["direct"][0]]
+    assert errors == pytest.approx([float(error) for error in told.groups()], rel=0.05)
+    told = re.search(
+        r"is ([\d.]+) %, below the ([\d.]+) % of direct regression and the ([\d.]+) % of the incon", page
+    )
+    shares = [found[risk][1] for risk in ("adaptive", "direct", "inconsistency")]
+    assert shares == pytest.approx([float(share) for share in told.groups()], abs=1.0)
+    demos = [uc.load(printed[1] / f"{name}_circle.npz") for name in ("planer", "curve")]
+    both = uc.Demonstrations.concatenate(demos)
+    P = uc.load_policy(printed[1] / "fine.skops").predict(both.states)
+    size = float(re.search(r"square, ([\d.]+) times as large", page).group(1))
+    assert np.sqrt(np.mean(P**2) / np.mean(both.actions**2)) == pytest.approx(size, abs=0.1)
+    for demonstrations in demos:
+        policy = uc.ParametricPolicy(uc.NormalizedRBF()).fit(
+            demonstrations.states, demonstrations.actions, groups=demonstrations.blocks(5)
+        )
+        assert policy.free_share_ == 1.0
 
 
 def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     place = printed[1]
     flat, curved = (uc.load(place / f"{name}_circle.npz") for name in ("planer", "curve"))
-    path = np.genfromtxt(place / "rollout.csv", delimiter=",", names=True)
-    learnt = np.column_stack([path["x"], path["y"], path["z"]])
-    both = uc.Demonstrations.concatenate([flat, curved])
-    direct = uc.ParametricPolicy(risk="direct", alpha="cv").fit(
-        both.states, both.actions, groups=both.blocks(5)
+    learnt, adaptive = (
+        np.column_stack([path[axis] for axis in "xyz"])
+        for path in (
+            np.genfromtxt(place / name, delimiter=",", names=True) for name in ("along.csv", "rollout.csv")
+        )
     )
     surface = np.array([[0.42, 0.30, -0.86]])
-    regression = rollout(direct, learnt[0], 1250, 0.002, surface).states
     told = re.search(
-        r"goes round ([\d.]+) times: ([\d.]+) turns a second, where the person made ([\d.]+) on the flat surface and "
-        r"([\d.]+) on\s+the curved one. The direct policy makes (\d\.\d+)",
+        r"goes round ([\d.]+) times in 2.5 s: ([\d.]+) turns a second, where the person made ([\d.]+) on the flat "
+        r"surface and ([\d.]+) on\s+the curved one. The adaptive policy makes (\d\.\d+)",
         PAGE,
     )
-    found = [_turns(learnt), _turns(learnt) / 2.5, _rate(flat), _rate(curved), _turns(regression) / 2.5]
+    found = [_turns(learnt), _turns(learnt) / 2.5, _rate(flat), _rate(curved), _turns(adaptive) / 2.5]
     assert found == pytest.approx([float(number) for number in told.groups()], abs=0.015)
     thinnest = np.linalg.svd(flat.states, full_matrices=False)[2][2]
     assert abs(thinnest @ surface[0]) > 0.999
@@ -103,11 +153,11 @@ def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     across = np.linalg.svd(flat.actions, full_matrices=False)[2][2]
     assert np.sum((flat.actions @ across) ** 2) / np.sum(flat.actions**2) == pytest.approx(0.06, abs=0.005)
     shares = []
-    for name in ("flat-circle", "flat-circle-direct"):
+    for name in ("flat-circle-inconsistency", "flat-circle"):
         P = uc.load_policy(place / f"{name}.skops").predict(curved.states)
         shares += [explained(curved.actions, P - np.outer(P @ across, across)), explained(curved.actions, P)]
     told = re.search(
-        r"explains\s+(\d+) % instead of (\d+) %, the direct one (\d+) % instead of (\d+) %", PAGE
+        r"explains\s+(\d+) % instead of (\d+) %, the adaptive one (\d+) % instead of (\d+) %", PAGE
     )
     assert shares == pytest.approx([float(number) / 100 for number in told.groups()], abs=0.01)
 

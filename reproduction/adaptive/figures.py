@@ -95,7 +95,7 @@ def plot_sphere() -> Figure:
         (v, colors.SERIES[2], "v = Nπ", (4, 10)),
     ):
         ax.annotate(
-            "", tip, (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0}
+            "", tuple(tip), (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0}
         )
         ax.annotate(name, tuple(tip), aside, textcoords="offset points", color=color, fontsize=11)
     ax.plot(*np.array([v, pi]).T, ":", color=colors.SERIES[2], lw=1.6)

@@ -95,12 +95,12 @@ def plot_sphere() -> Figure:
         (v, colors.SERIES[2], "v = Nπ", (4, 10)),
     ):
         ax.annotate(
-            "", tip, (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0}
+            "", tuple(tip), (0, 0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "shrinkA": 0}
         )
-        ax.annotate(name, tip, aside, textcoords="offset points", color=color, fontsize=11)
+        ax.annotate(name, tuple(tip), aside, textcoords="offset points", color=color, fontsize=11)
     ax.plot(*np.array([v, pi]).T, ":", color=colors.SERIES[2], lw=1.6)
     ax.plot(*(pi / 2), "+", color=colors.RECORDED, ms=9)
-    ax.annotate("π/2", pi / 2, (6, -14), textcoords="offset points", color=colors.RECORDED)
+    ax.annotate("π/2", tuple(pi / 2), (6, -14), textcoords="offset points", color=colors.RECORDED)
     ax.plot(0, 0, ".", color=colors.TRUE)
     ax.annotate("0", (0, 0), (-12, -4), textcoords="offset points")
     ax.set_aspect("equal")

@@ -415,3 +415,12 @@ def test_means_are_over_the_trials_that_have_a_cell():
     means = judgement.average([{"a": {DIRECT: 1.0}}, {"a": {DIRECT: 3.0}, "b": {DIRECT: 4.0}}])
     assert means == {"a": {DIRECT: 2.0}, "b": {DIRECT: 4.0}}
     assert judgement.average_cells(means) == {DIRECT: 3.0}
+
+
+def test_the_spheres_picture_shows_actions_near_it_and_near_its_pole():
+    (ax,) = figures.plot_sphere().axes
+    sphere, constrained, free = (line.get_xydata() for line in ax.lines[:3])
+    center = (sphere.min(axis=0) + sphere.max(axis=0)) / 2
+    radius = np.linalg.norm(sphere - center, axis=1).mean()
+    assert abs(np.linalg.norm(constrained - center, axis=1) - radius).max() < 0.2
+    assert np.linalg.norm(free - 2 * center, axis=1).max() < 0.2

@@ -151,7 +151,7 @@ def test_beyond_the_data_a_decoupled_policy_goes_on_straight(degree):
 @pytest.mark.parametrize("features", SQUARE)
 def test_streams_files_and_clones_treat_them_like_any_other(features, tmp_path):
     X, U, _, episodes = joints(n_episodes=10, length=20, n=2, rows=1)
-    policy = uc.ParametricPolicy(features, alpha="cv").fit(X, U, groups=episodes)
+    policy = uc.ParametricPolicy(features, risk="inconsistency", alpha="cv").fit(X, U, groups=episodes)
     assert set(vars(features)) == set(features.get_params(deep=False))  # what is learnt stays in the policy
     again = clone(policy).partial_fit(X, U, groups=episodes)
     np.testing.assert_allclose(again.predict(X), policy.predict(X), atol=1e-9)

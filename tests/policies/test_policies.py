@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.base import clone
 from sklearn.kernel_approximation import Nystroem
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
@@ -180,8 +181,9 @@ def test_chosen_alpha_has_the_least_held_out_risk_and_respects_episodes():
 def test_partial_fit_deals_episodes_out_as_fit_does():
     demos = toy.demonstrate(n_episodes=7, random_state=0)
     features = uc.NormalizedRBF(centers=demos.states[::20], width=0.6)
-    whole = uc.ParametricPolicy(features, alpha="cv").fit(demos.states, demos.actions, groups=demos.episodes)
-    pieces = uc.ParametricPolicy(features, alpha="cv")
+    policy = uc.ParametricPolicy(features, risk="inconsistency", alpha="cv")
+    whole = clone(policy).fit(demos.states, demos.actions, groups=demos.episodes)
+    pieces = policy
     for part in (slice(0, 50), slice(50, 130), slice(130, None)):  # episodes of 40 straddle the pieces
         pieces.partial_fit(demos.states[part], demos.actions[part], groups=demos.episodes[part])
     assert pieces.alpha_ == pytest.approx(whole.alpha_)
@@ -248,7 +250,7 @@ X, U = np.eye(4)[:, :2], np.ones((4, 2))
         ),
         (
             lambda: uc.ParametricPolicy(risk="naive").fit(X, U),
-            "risk must be one of 'inconsistency', 'direct'",
+            "risk must be one of 'adaptive', 'inconsistency', 'direct'",
         ),
         (lambda: uc.ParametricPolicy(alpha="best").fit(X, U), "alpha, where it is not a number"),
         (lambda: uc.ParametricPolicy(alpha=-1).fit(X, U), "alpha must be a finite number of at least zero"),
@@ -316,7 +318,9 @@ def test_one_action_beside_which_nothing_else_moves_is_named():
 def test_actions_in_any_unit_that_can_be_squared_are_learnt_from():
     states = np.random.default_rng(0).normal(size=(50, 2))
     for unit in (1e-140, 1.0, 1e140):
-        policy = uc.ParametricPolicy().fit(states, -unit * states)
+        policy = uc.ParametricPolicy(risk="inconsistency").fit(states, -unit * states)
         np.testing.assert_allclose(policy.predict(states), -unit * states, rtol=1e-6)
     with pytest.raises(uc.errors.DataError, match="give them in another unit"):
-        uc.ParametricPolicy().fit(states, -1e-200 * states)
+        uc.ParametricPolicy(risk="inconsistency").fit(states, -1e-200 * states)
+    with pytest.raises(uc.errors.DataError, match="give the actions in another unit"):
+        uc.ParametricPolicy().fit(states, -1e-140 * states)

@@ -28,13 +28,15 @@ def test_known_layouts_need_no_columns(tmp_path, version):
 def test_components_go_by_the_names_the_dataset_gives_them(tmp_path, names):
     folder = written.lerobot(tmp_path / "robot", X, U, EPISODES, TIME, names=names)
     policy = fit_stream(
-        uc.ParametricPolicy(alpha=1e-6), uc.open(folder, state=["grip.pos", "pan.pos"], action="lift.pos")
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+        uc.open(folder, state=["grip.pos", "pan.pos"], action="lift.pos"),
     )
-    whole = uc.ParametricPolicy(alpha=1e-6).fit(X32[:, [2, 0]], U32[:, [1]])
+    whole = uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(X32[:, [2, 0]], U32[:, [1]])
     assert_same_fit(policy, whole, X32[:, [2, 0]])
     by_place = ["observation.state[2]", "observation.state[0]"]
     policy = fit_stream(
-        uc.ParametricPolicy(alpha=1e-6), uc.open(folder, state=by_place, action=["action[1]"])
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6),
+        uc.open(folder, state=by_place, action=["action[1]"]),
     )
     assert_same_fit(policy, whole, X32[:, [2, 0]])
 
@@ -43,7 +45,8 @@ def test_components_go_by_the_names_the_dataset_gives_them(tmp_path, names):
 def test_names_that_name_no_components_are_left_alone(tmp_path, names):
     folder = written.lerobot(tmp_path / "robot", X, U, EPISODES, TIME, names=names)
     assert_same_fit(
-        fit_stream(uc.ParametricPolicy(alpha=1e-6), folder), uc.ParametricPolicy(alpha=1e-6).fit(X32, U32)
+        fit_stream(uc.ParametricPolicy(risk="inconsistency", alpha=1e-6), folder),
+        uc.ParametricPolicy(risk="inconsistency", alpha=1e-6).fit(X32, U32),
     )
 
 

@@ -288,7 +288,7 @@ def test_ctrl_c_between_passes_loses_nothing(tmp_path, monkeypatch):
         ('"stage": "run"', '"stage": 3'),
         ('"cooling": false', '"cooling": 1.5'),
         ('"leave_free": ', '"leave_free": null, "leave": '),
-        ('"evidence": 1.0', '"evidence": {"tuple": []}'),
+        ('"is_cooling": false', '"is_cooling": {"tuple": []}'),
         ('"log_likelihoods": ', '"log_likelihoods": null, "other": '),
         ('"runs": [', '"runs": [null, '),
         ("w", None),

@@ -65,7 +65,7 @@ class DecoupledFeatures(BaseEstimator):
     >>> X = np.random.default_rng(0).uniform(-1, 1, size=(500, 3))
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(500, 1, 3)))
     >>> U = np.einsum("nij,nj->ni", N, -np.sin(3 * X))
-    >>> policy = uc.ParametricPolicy(uc.DecoupledFeatures()).fit(X, U)
+    >>> policy = uc.ParametricPolicy(uc.DecoupledFeatures(), risk="inconsistency").fit(X, U)
     >>> bool(uc.metrics.unconstrained_policy_error(-np.sin(3 * X), policy.predict(X)) < 1e-6)
     True
     """

@@ -236,7 +236,8 @@ class Accumulator:
             judges = self._by_fold(
                 samples, found.judge(self.scale, 0.0 if self.belief.is_cooling else None), counted, fold
             )
-        return replace(counts, moments=moments, judges=judges, tallies=(found.tally,))
+        shortest = float(r.min(initial=math.inf, where=moves))
+        return replace(counts, moments=moments, judges=judges, tallies=(found.tally,), shortest=shortest)
 
     def include(self, sums: Sums) -> None:
         """Add sums to those there are.

@@ -30,7 +30,10 @@ def test_what_goes_wrong_in_a_thread_reaches_the_caller():
 
 @pytest.mark.parametrize(
     "policy",
-    [uc.ParametricPolicy(uc.NormalizedRBF(20), alpha=0.1), uc.LocallyLinearPolicy(n_centers=9, alpha=0.1)],
+    [
+        uc.ParametricPolicy(uc.NormalizedRBF(20), risk="inconsistency", alpha=0.1),
+        uc.LocallyLinearPolicy(n_centers=9, risk="inconsistency", alpha=0.1),
+    ],
 )
 def test_a_fit_is_the_same_in_one_thread_in_many_and_side_by_side(policy):
     rng = np.random.default_rng(0)

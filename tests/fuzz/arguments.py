@@ -30,7 +30,8 @@ ELSEWHERE = {
 }
 """Functions about files, which other areas call."""
 PROTOCOL = {
-    "along", "basis", "gradient", "evaluate", "evaluate_rows", "place", "start", "finish", "resume", "posterior",
+    "along", "basis", "gradient", "evaluate", "evaluate_rows", "place", "start", "finish", "resume", "observe",
+    "posterior",
     "check_options", "get_params", "set_params", "get_metadata_routing", "model", "moments", "potential",
     "get_feature_names_out", "slopes", "compile_descent",
 }  # fmt: skip

@@ -42,25 +42,6 @@ def _one_thread():
         yield
 
 
-@pytest.fixture
-def stubbed(monkeypatch):
-    """A library in which "adaptive" is there: told the projections, and sure of which samples were free."""
-    learn = ways.learn
-
-    def stub(policy, way, demos, known=None):
-        if way != ADAPTIVE:
-            return learn(policy, way, demos, known)
-        projections = demos.projections
-        told = learn(policy, INCONSISTENCY if projections is None else TOLD, demos, projections)
-        told.noise_, told.speed_noise_, told.free_share_ = 0.01, 0.0, 0.5
-        told.free_probability = lambda X, U, groups: 1.0 * is_free(projections)
-        return told
-
-    for module in (ways, recorded, experiment):
-        monkeypatch.setattr(module, "learn", stub)
-    return ways.WAYS
-
-
 def _line_data(n=400, d=3, seed=0, free=0.3):
     """Samples of one linear policy, some free and the others under one random row."""
     rng = np.random.default_rng(seed)
@@ -128,7 +109,7 @@ def test_where_everything_is_free_there_is_nothing_to_tell():
 def test_the_prior_is_as_wide_as_the_policy_s_parameters():
     rng = np.random.default_rng(0)
     X = rng.normal(size=(300, 30))
-    model = ParametricPolicy().fit(X, X).model_
+    model = ParametricPolicy(risk="inconsistency").fit(X, X).model_
     for deviation in (0.1, 10.0):
         Pi = np.column_stack([X, np.ones(300)]) @ (deviation * rng.normal(size=(31, 30)))
         v = find_prior_variance(model, X, Pi, 1e-3)
@@ -199,15 +180,17 @@ def test_told_is_the_inconsistency_with_all_projections():
     assert set(KNOWN) <= set(ways.list_ways()) <= set(ways.WAYS)
 
 
-def test_a_cell_has_errors_bounds_and_what_was_found(stubbed):
+def test_a_cell_has_errors_bounds_and_what_was_found():
     data, test = demonstrate(20, free=0.5, random_state=0), demonstrate(10, random_state=1)
-    cell = ways.compare_ways(demo.make_policy(), stubbed, data, test, 0.05, np.random.default_rng(2))
-    assert cell[ADAPTIVE] == cell[TOLD] < cell[INCONSISTENCY] < cell[DIRECT]
+    cell = ways.compare_ways(demo.make_policy(), ways.WAYS, data, test, 0.05, np.random.default_rng(2))
+    assert max(cell[ADAPTIVE], cell[TOLD]) < cell[INCONSISTENCY] < cell[DIRECT]
     assert cell["bound"] > cell["told bound"] > 0
     assert cell["determined"] == 1.0
-    assert (cell["noise"], cell["free"], cell["contact right"]) == (0.01, 0.5, 1.0)
+    assert cell["noise"] == pytest.approx(cell["true noise"], rel=0.2)
+    assert cell["free"] == pytest.approx(cell["true free"], abs=0.1)
+    assert cell["contact right"] > 0.9
     assert cell["true free"] == is_free(data.projections).mean()
-    clean = ways.compare_ways(demo.make_policy(), stubbed, data, test, 0.0, np.random.default_rng(2))
+    clean = ways.compare_ways(demo.make_policy(), ways.WAYS, data, test, 0.0, np.random.default_rng(2))
     assert clean["true noise"] == 0.0
     assert 0 < clean["bound"] < cell["bound"]
 
@@ -276,7 +259,7 @@ def test_every_cell_of_the_cycle_has_its_reach(tmp_path):
     assert "25 % free, 5 % noise" in result
     for noise in simulated.NOISE:
         free = result[simulated.name_cycle_cell(1.0, noise)]
-        assert free[DIRECT] == pytest.approx(free[TOLD], rel=1e-6)
+        assert free[DIRECT] == pytest.approx(free[TOLD], rel=1e-3)
         assert free["bound"] == free["told bound"]
     assert simulated.SIMULATED["cycle"].reaches["50 % free, 0 % noise"].told == 2.0
     figures.plot_cycle([result]).savefig(tmp_path / "cycle.png")
@@ -367,11 +350,11 @@ def test_the_likelihood_of_held_out_blocks_prefers_the_truth():
 # --- The experiment --------------------------------------------------------------------------------------------------
 
 
-def test_the_experiment_goes_on_and_says_what_is_left_out(tmp_path, monkeypatch, stubbed, data_folder):
+def test_the_experiment_goes_on_and_says_what_is_left_out(tmp_path, monkeypatch, data_folder):
     small = {"cycle": replace(simulated.SIMULATED["cycle"], run=partial(_small_cycle, 6))}
     parts = small | {name: recorded.RECORDED[name] for name in ("handwriting", "surfaces")}
     monkeypatch.setattr(experiment, "PARTS", parts)
-    monkeypatch.setattr(experiment, "list_ways", lambda: stubbed)
+    monkeypatch.setattr(experiment, "list_ways", lambda: ways.WAYS)
     monkeypatch.setattr(recorded, "describe_found", lambda *_: {})
     outcome = experiment.reproduce(tmp_path / "out", trials=2, console=QUIET, data=data_folder)
     assert "### Limit cycle, 40 movements" in outcome.table

@@ -3,6 +3,7 @@
 import functools
 import math
 from contextlib import suppress
+from functools import cache
 
 import numpy as np
 import pytest
@@ -322,23 +323,24 @@ def test_policies_with_another_state_are_damaged(attribute, value, tmp_path):
         uc.load_policy(tmp_path / "p.skops")
 
 
+@cache
+def fitted_policies():
+    X = np.random.default_rng(0).normal(size=(30, 2))
+    policies = [
+        uc.ParametricPolicy(SplineTransformer()),
+        uc.ParametricPolicy(PolynomialFeatures(2)),
+        uc.ParametricPolicy(uc.NormalizedRBF(4)),
+        uc.LocallyLinearPolicy(n_centers=3),
+        uc.ParametricPolicy(uc.DecoupledFeatures(4)),
+    ]
+    return [policy.fit(X, X) for policy in policies]
+
+
 @settings(deadline=None, max_examples=200)
 @given(st.data())
 def test_states_changed_at_random_are_damaged_or_work(tmp_path_factory, data):
     X = np.random.default_rng(0).normal(size=(30, 2))
-    tree, arrays = storage.encode(
-        data.draw(
-            st.sampled_from(
-                [
-                    uc.ParametricPolicy(SplineTransformer()),
-                    uc.ParametricPolicy(PolynomialFeatures(2)),
-                    uc.ParametricPolicy(uc.NormalizedRBF(4)),
-                    uc.LocallyLinearPolicy(n_centers=3),
-                    uc.ParametricPolicy(uc.DecoupledFeatures(4)),
-                ]
-            )
-        ).fit(X, X)
-    )
+    tree, arrays = storage.encode(data.draw(st.sampled_from(fitted_policies())))
     node = tree
     while True:  # walk down at random, and change what is met
         inner = [(node, key) for key in (node if isinstance(node, dict) else range(len(node)))]

@@ -339,7 +339,6 @@ def fitted_policies():
 @settings(deadline=None, max_examples=200)
 @given(st.data())
 def test_states_changed_at_random_are_damaged_or_work(tmp_path_factory, data):
-    X = np.random.default_rng(0).normal(size=(30, 2))
     tree, arrays = storage.encode(data.draw(st.sampled_from(fitted_policies())))
     node = tree
     while True:  # walk down at random, and change what is met

@@ -13,7 +13,7 @@ IN_DOUBT = (
     "them look constrained, so try a finer model (more centres, another width or another kind), which can tell"
 )
 
-DOUBTFUL = 1.0
+DOUBTFUL = 0.1
 """Gain in log-likelihood of a sample, whatever it is worth, by which contact would explain more than none."""
 
 

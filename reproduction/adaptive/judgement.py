@@ -11,6 +11,9 @@ from reproduction.adaptive.ways import ADAPTIVE, DIRECT, INCONSISTENCY, TOLD, WA
 EXACT = 1e-9
 """Errors below this are rounding, whatever multiple of another's rounding they are: the paper's "order of 1e-9"."""
 
+ALIKE = 1e-3
+"""Share by which figures may differ that are the same: a policy solved on the way of two risks."""
+
 DETERMINED = 0.99
 """Share of the policy's directions that the known projections must determine for the bound to be asked for."""
 
@@ -77,7 +80,8 @@ def judge(cell: Cell, reach: Reach) -> Verdict:
     """Judge the means of a cell."""
     if reach.likelihood:
         others = max(cell[DIRECT], cell[INCONSISTENCY])
-        return Verdict("≥ both others", cell[ADAPTIVE] >= others if ADAPTIVE in cell else None)
+        reached = cell[ADAPTIVE] >= others - ALIKE * abs(others) if ADAPTIVE in cell else None
+        return Verdict("≥ both others", reached)
     limits = _list_limits(cell, reach)
     words = [f"≤ {words}" for words, _ in limits]
     limit = max(min((limit for _, limit in limits), default=np.inf), EXACT)
@@ -88,7 +92,7 @@ def judge(cell: Cell, reach: Reach) -> Verdict:
         words.append(f"contact ≥ {100 * reach.contact:g} %")
     if not words or ADAPTIVE not in cell:
         return Verdict(", ".join(words), None, impossible)
-    reached = cell[ADAPTIVE] <= limit
+    reached = cell[ADAPTIVE] <= (1 + ALIKE) * limit
     if reach.contact is not None:
         reached = reached and cell["contact right"] >= reach.contact
     return Verdict(

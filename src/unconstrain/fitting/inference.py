@@ -62,12 +62,12 @@ FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, SPEED = (
 INDEPENDENT = 0.5
 """Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
 
-NOTICEABLE = 0.015
+NOTICEABLE = 0.03
 """Gain in held-out log-likelihood, per independent sample, for which contact is taken to be there. Residuals of a model
 that does not quite fit change slowly along an episode, and a hundred samples then tell no more than one."""
 
-DECISIVE = 10.0
-"""The same of all samples together: odds of 20,000 to one."""
+DECISIVE = 20.0
+"""The same of all samples together."""
 
 LARGEST_POLICY = 2.0
 """How many times √d larger than what is recorded a policy may be. Of a large enough one anything is left: near the
@@ -414,7 +414,7 @@ class Inference:
         gain = self.likelihoods[run.name] - self.likelihoods[other.name]
         if run.name == SPEED:  # what was held out may lie far off, and then a wider noise explains it
             gain = min(gain, (run.log_likelihood - other.log_likelihood) / n_samples)
-        gain *= run.evidence
+        gain *= min(run.evidence / INDEPENDENT, 1.0)
         plausible = run.size <= LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)
         return gain if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE else 0.0
 

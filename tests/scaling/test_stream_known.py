@@ -78,8 +78,10 @@ def test_however_the_rows_lie_in_files_the_fit_is_that_of_all_at_once(
     columns = DERIVED if derived else {name: COLUMNS[name] for name in ("state", "action")}
     columns = columns | ({"episode": "episode_index"} if labelled else {})
     files = sorted((folder / ("one" if labelled else "parts")).iterdir())
-    if derived and not labelled and not cuts:
-        return  # one episode only: there is nothing to hold out
+    if derived and not labelled and (not cuts or way == "columns"):
+        # One episode only: there is nothing to hold out. And where a movement begins amid another's time, the state
+        # jumps, which no recorded projection lets through.
+        return
     whole, demos = in_memory(policies()[which], files, columns, way)
     streamed = uc.fit_stream(
         policies()[which], uc.open(folder / "parts", **columns, **WAYS[way]), batch_rows=batch_rows

@@ -19,15 +19,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import gammaln, ive, logsumexp
+from scipy.special import logsumexp
+
+from unconstrain.fitting.likelihood import Views
+from unconstrain.fitting.noise import Noise
+from unconstrain.fitting.sphere import Sphere, blurred
 
 Array = NDArray[np.float64]
 
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
 """Of the quadrature over η; seven suffice, since the sphere's points themselves are spread by its radius."""
-
-LEAST_COUPLING = 1e-8
-"""κ is kept above this, where the Bessel term is 1 to rounding: there is no division by zero at rest."""
 
 EVERY = 3
 """Samples to one that σ, τ and ρ are found from."""
@@ -80,17 +81,8 @@ def log_likelihood(U: Array, P: Array, spread: Spread) -> Array:
 
 def log_free(U: Array, P: Array, spread: Spread) -> Array:
     """Compute `log p(u | free)`, (N,)."""
-    d, E, length = U.shape[1], U - P, np.linalg.norm(P, axis=1)
-    along = np.divide(np.sum(E * P, axis=1), length, out=np.zeros(len(U)), where=length > 0)
-    across = np.maximum(np.sum(E**2, axis=1) - along**2, 0.0)
-    variance = spread.noise**2
-    variance_along = variance + (spread.speed * length) ** 2
-    return -0.5 * (
-        across / variance
-        + along**2 / variance_along
-        + (d - 1) * np.log(2 * np.pi * variance)
-        + np.log(2 * np.pi * variance_along)
-    )
+    noise = Noise(spread.noise**2, spread.speed**2)
+    return Views(U, P, noise, np.full(len(U), float(U.shape[1]))).whole.log
 
 
 def log_constrained(U: Array, P: Array, spread: Spread) -> Array:
@@ -104,9 +96,4 @@ def log_constrained(U: Array, P: Array, spread: Spread) -> Array:
 
 def log_sphere(U: Array, P: Array, noise: float) -> Array:
     """Compute the log density (N,) of points uniform on the sphere with diameter P (N, d), with noise."""
-    d, middle = U.shape[1], P / 2
-    away, radius = np.linalg.norm(U - middle, axis=1), np.linalg.norm(middle, axis=1)
-    order = d / 2 - 1
-    coupling = np.maximum(away * radius / noise**2, LEAST_COUPLING)
-    bessel = gammaln(d / 2) + order * np.log(2 / coupling) + np.log(ive(order, coupling))
-    return -d / 2 * np.log(2 * np.pi * noise**2) - (away - radius) ** 2 / (2 * noise**2) + bessel
+    return blurred(Sphere.of(U, P), np.full(len(U), noise**2)).log

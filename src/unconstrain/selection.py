@@ -445,7 +445,7 @@ def _hold_out(
     assert belief is not None
     if policy.alpha != "cv":  # contact was inferred with another λ than the one asked for
         fitted = clone(policy).fit(X, U, groups=groups, projections=projections)
-    return _HeldOut(fitted, predictions, fold, free, belief.noise.across, likelihood)
+    return _HeldOut(fitted, predictions, fold, free, belief.noise.action, likelihood)
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -50,7 +50,7 @@ expansions = settings(max_examples=25)
 @expansions
 @given(seeds, st.integers(1, 5), st.sampled_from([0.0, 0.5, 1.0]), st.booleans())
 def test_products_rows_and_pulls_of_an_expansion_agree(seed, d, known, is_judge):
-    model, belief, samples, told, _ = problem(seed, d, known=known, noise=Noise(0.01, 0.01, 0.01))
+    model, belief, samples, told, _ = problem(seed, d, known=known, noise=Noise(0.01, 0.01))
     found = infer(model, belief, samples)
     seen = found.judge(2.0) if is_judge else found.expand()
     A = np.einsum("nk,nki,nkj->nij", seen.row_weights, seen.rows, seen.rows)
@@ -79,7 +79,7 @@ def test_products_rows_and_pulls_of_an_expansion_agree(seed, d, known, is_judge)
         views, free = found.views, found.taken_whole[:, None]
         expected = free * views.whole.gradient + (1 - free) * views.constrained.gradient
         np.testing.assert_allclose(
-            gradient, belief.noise.across * expected, atol=1e-9 * (1 + np.abs(seen.pulls).max())
+            gradient, belief.noise.action * expected, atol=1e-9 * (1 + np.abs(seen.pulls).max())
         )
         assert np.isfinite(error).all()
 

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from sklearn.base import clone
 from sklearn.preprocessing import PolynomialFeatures
 
 import unconstrain as uc
@@ -223,3 +224,13 @@ def test_ninety_percent_of_the_truth_lies_in_the_interval_under_noise():
         P, deviation = cubic().fit(demos).predict(demos.states[::7], return_std=True)
         inside.append(np.mean(np.abs(P - demos.policy[::7]) <= NINETY * deviation))
     assert 0.85 <= np.mean(inside) <= 0.96
+
+
+def test_one_recording_is_inferred_along_its_time_as_the_program_and_streams_do():
+    several = limit_cycle.demonstrate(10, noise=0.05, free=0.5, random_state=0)
+    one = uc.Demonstrations(several.states, several.actions)
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(25))
+    whole = clone(policy).fit(one)
+    blocks = clone(policy).fit(one.states, one.actions, groups=one.blocks(5))
+    np.testing.assert_array_equal(whole.predict(one.states), blocks.predict(one.states))
+    assert whole.free_share_ != clone(policy).fit(one.states, one.actions).free_share_

@@ -153,7 +153,7 @@ class Found(NamedTuple):
             Of N samples.
         """
         views, free = self.views, self.taken_whole
-        unit, whole, bent, sphere = views.noise.across, views.whole, views.constrained, views.sphere
+        unit, whole, bent, sphere = views.noise.action, views.whole, views.constrained, views.sphere
         not_free = 1 - free
         along = free * (unit * whole.information - 1)
         towards = not_free * unit / bent.variance
@@ -190,12 +190,13 @@ class Found(NamedTuple):
         Computational Statistics and Data Analysis 47, 2004.
         """
         U, free = self.views.U, self.taken_whole
-        d, v = U.shape[1], self.views.noise.across if variance is None else variance
+        d, v = U.shape[1], self.views.noise.action if variance is None else variance
         y = np.einsum("nd,nd->n", U, U)
         bent = (1 - free) / scale
         pulls = (free + bent * (y - (d + 2) * v))[:, None] * U
         squares = free * y + bent * (y**2 - (2 * d + 4) * v * y + d * (d + 2) * v**2)
-        # What noise adds to either whatever the policy is, so that small differences are seen beside it.
+        # Corrected, the least risk would be next to zero, and any difference a large share of it. So what noise leaves
+        # of any policy is kept, and "as good as the least" means beside that.
         squares = squares + bent * v * y
         zero = np.zeros_like(free)
         return Expanded(
@@ -246,9 +247,8 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
     apart = starts | known
     apart[1:] |= known[:-1]
     if belief.drift is not None and d > 1 and not starts.all():
-        # Across the sphere there is no noise of speed.
-        across = belief.noise.action + views.sphere.share * belief.noise.misfit
-        steps = Steps.of(views.sphere, across, apart, belief.drift)
+        # Along the sphere there is no noise of speed.
+        steps = Steps.of(views.sphere, np.full(N, belief.noise.action), apart, belief.drift)
     free, log_likelihood, counts, kept = smooth(
         log_free,
         log_bent,
@@ -297,16 +297,15 @@ def _squares(views: Views, free: Floats, omega: Floats) -> Squares:
     taken, bends = omega * free, omega * (1 - free)
     one, zero = np.ones_like(free), np.zeros_like(free)
     r2 = np.einsum("nd,nd->n", views.U, views.U)
-    share = views.sphere.share
     parts = [
         (
             taken * np.maximum(views.ranks - 1, 0),
             taken * whole.across,
-            np.full_like(one, noise.across),
-            (one, zero, one),
+            np.full_like(one, noise.action),
+            (one, zero),
         ),
-        (taken * (views.ranks > 0.5), taken * whole.along, whole.variance, (one, whole.length**2, one)),
-        (bends, bends * bent.square, bent.variance, (one, share * r2, share)),
+        (taken * (views.ranks > 0.5), taken * whole.along, whole.variance, (one, whole.length**2)),
+        (bends, bends * bent.square, bent.variance, (one, views.sphere.share * r2)),
     ]
     return Squares.sum(parts)
 
@@ -315,7 +314,7 @@ def _echo(views: Views, free: Floats, starts: NDArray[np.bool_], omega: Floats) 
     """Sum up how residuals agree with those before them, and their squares."""
     follows = omega[1:] * ~starts[1:]
     both, neither = free[1:] * free[:-1] * follows, (1 - free[1:]) * (1 - free[:-1]) * follows
-    as_free = (views.U - views.P) / np.sqrt(views.noise.across)
+    as_free = (views.U - views.P) / np.sqrt(views.noise.action)
     as_bent = (views.sphere.distance / np.sqrt(views.constrained.variance))[:, None]
     echo = energy = 0.0
     for weight, e in ((both, as_free), (neither, as_bent)):

@@ -25,7 +25,7 @@ import numpy as np
 from unconstrain.errors import DataError
 from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.chain import Chain
-from unconstrain.fitting.contact import Belief
+from unconstrain.fitting.contact import Belief, Tally
 from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
@@ -93,6 +93,8 @@ class Run:
         Passes at most.
     cooling : bool
         Whether the noise is still being lowered.
+    keeps_alpha : bool
+        Whether λ stays what it is, that of the run from whose end this one goes on.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Run:
     belief: Belief
     most: int = MOST_PASSES
     cooling: bool = True
+    keeps_alpha: bool = False
     passes: int = 0
     since_cool: int = 0
     halvings: int = 0
@@ -110,24 +113,28 @@ class Run:
     accepted: Accumulator | None = None
 
     @property
-    def evidence(self) -> float:
-        """How many independent samples a sample is worth where the run ended."""
+    def end(self) -> Belief:
+        """The belief of the last pass that was accepted."""
         assert self.accepted is not None
-        return self.accepted.total.tallies[0].evidence
+        assert self.accepted.belief is not None
+        return self.accepted.belief
+
+    @property
+    def tally(self) -> Tally:
+        """What that pass has found."""
+        assert self.accepted is not None
+        return self.accepted.total.tallies[0]
 
     @property
     def size(self) -> float:
         """How many times larger the policy is than what is recorded, root mean square."""
-        assert self.accepted is not None
-        (tally,) = self.accepted.total.tallies
-        return float(np.sqrt(tally.meant / tally.shown)) if tally.shown > 0 else 0.0
+        return float(np.sqrt(self.tally.meant / self.tally.shown)) if self.tally.shown > 0 else 0.0
 
     @property
     def chooses_alpha(self) -> bool:
-        """Whether λ is chosen with the next pass; runs that start where another ended take that one's."""
-        begins_anew = self.most != SHORT_RUN
+        """Whether λ is chosen with the next pass."""
         due = self.passes % PASSES_PER_CHOICE == 0 or self.since_cool == SETTLING - 1
-        return begins_anew and not self.is_climbing and due
+        return due and not (self.keeps_alpha or self.is_climbing)
 
     @property
     def is_climbing(self) -> bool:
@@ -164,10 +171,7 @@ class Run:
         if self.halvings > HALVINGS or self.passes >= self.most:
             self.is_done = True
             return
-        assert self.accepted is not None
-        before = self.accepted.belief
-        assert before is not None
-        self.belief = _between(before, self.belief)
+        self.belief = _between(self.end, self.belief)
 
     def _step(self, done: Accumulator, floor: float) -> None:
         belief, (tally,) = self.belief, done.total.tallies
@@ -235,9 +239,7 @@ class Inference:
             wanted.is_judged = self.blank.alpha == "cv" and run.chooses_alpha
             return wanted
         if self.stage == "final":
-            accepted = self.compared[0].accepted
-            assert accepted is not None
-            return self._blank("adaptive", accepted.belief)
+            return self._blank("adaptive", self.compared[0].end)
         wanted = self._blank("adaptive", self.runs[0].belief)
         wanted.compared = tuple(
             _held_out_beliefs(run, noise) for run, noise in zip(self.compared, self.noises, strict=True)
@@ -362,34 +364,25 @@ class Inference:
 
     def _next_run(self) -> None:
         """Start the next run, or compare those there are."""
-        names = [run.name for run in self.runs]
+        names, best = [run.name for run in self.runs], self._likeliest()
         if FROM_DIRECT not in names:
             self._run(FROM_DIRECT, self.starts[FREE])
         elif FROM_INCONSISTENCY not in names:
             self._run(FROM_INCONSISTENCY, self.starts[CONSTRAINED])
         elif not self.likelihoods:
             self._begin_comparison(self.runs)
-        elif (
-            SPEED not in names and self.blank.model.n_actions > 1 and self._likeliest().evidence > INDEPENDENT
-        ):
-            noise = replace(self._best.noise, speed=SPEED_AT_FIRST)
-            start, alpha = replace(self._best, noise=noise), self._likeliest().alpha
-            self._run(SPEED, start, kinds=("action", "speed"), most=SHORT_RUN, cooling=False, alpha=alpha)
-            self.stage = "run"
+        elif SPEED not in names and self.blank.model.n_actions > 1 and best.tally.evidence > INDEPENDENT:
+            start = replace(best.end, noise=replace(best.end.noise, speed=SPEED_AT_FIRST))
+            self._go_on(SPEED, start, best.alpha, kinds=("action", "speed"))
         elif CONSTRAINED not in names:
-            alpha = self._likeliest().alpha
-            self._run(CONSTRAINED, self._best, held="constrained", most=SHORT_RUN, cooling=False, alpha=alpha)
-            self.stage = "run"
+            self._go_on(CONSTRAINED, best.end, best.alpha, held="constrained")
         else:
             self._begin_comparison([run for run in self.runs if run.name not in self.likelihoods])
 
-    @property
-    def _best(self) -> Belief:
-        """The belief of the likeliest run, from which others go on."""
-        accepted = self._likeliest().accepted
-        assert accepted is not None
-        assert accepted.belief is not None
-        return accepted.belief
+    def _go_on(self, name: str, start: Belief, alpha: float | None, **options: Any) -> None:
+        """Start a short run where another ended."""
+        self._run(name, start, most=SHORT_RUN, cooling=False, alpha=alpha, keeps_alpha=True, **options)
+        self.stage = "run"
 
     def _likeliest(self) -> Run:
         """Choose the run that beats "all free" most clearly, "all free" itself if none does.
@@ -398,6 +391,7 @@ class Inference:
         with fewer as clearly. What a gain counts hangs on the evidence of the run that gains, not of the one it is
         compared with: residuals of a wrong explanation are correlated because it is wrong.
         """
+        free = self.runs[0]
         runs = {run.name: run for run in self.runs if run.name in self.likelihoods}
 
         def clearest(names: tuple[str, ...], best: Run) -> Run:
@@ -405,22 +399,21 @@ class Inference:
             name = max(gains, key=lambda name: gains[name], default=None)
             return best if name is None or gains[name] <= 0 else runs[name]
 
-        return clearest((SPEED,), clearest((FROM_DIRECT, FROM_INCONSISTENCY), runs[FREE]))
+        return clearest((SPEED,), clearest((FROM_DIRECT, FROM_INCONSISTENCY), free))
 
     def _gain(self, run: Run, other: Run) -> float:
         """Compute by how much a run explains more than another, per sample; 0 where that is not clear."""
-        assert run.accepted is not None
-        n_samples = run.accepted.total.tallies[0].n_samples
+        n_samples = run.tally.n_samples
         gain = self.likelihoods[run.name] - self.likelihoods[other.name]
         if run.name == SPEED:  # what was held out may lie far off, and then a wider noise explains it
             gain = min(gain, (run.log_likelihood - other.log_likelihood) / n_samples)
-        gain *= min(run.evidence / INDEPENDENT, 1.0)
+        gain *= min(run.tally.evidence / INDEPENDENT, 1.0)
         plausible = run.size <= LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)
         return gain if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE else 0.0
 
     def _begin_comparison(self, runs: list[Run]) -> None:
         self.compared = list(runs)
-        self.noises = [run.accepted.belief.noise for run in runs if run.accepted and run.accepted.belief]
+        self.noises = [run.end.noise for run in runs]
         self.stage = "noise"
 
     def _compare(self, done: Accumulator) -> None:
@@ -467,8 +460,7 @@ def _held_out_beliefs(run: Run, noise: Noise) -> tuple[Belief, ...]:
     """Return a belief for each fold, with parameters that are solved without it."""
     accepted = run.accepted
     assert accepted is not None
-    assert accepted.belief is not None
-    plain = replace(accepted.belief, noise=noise)
+    plain = replace(run.end, noise=noise)
     present = [k for k, part in enumerate(accepted.total.moments) if part is not None]
     if accepted.folds is None or len(present) < 2:
         return (plain,)

@@ -92,21 +92,21 @@ class Whole:
         along = np.einsum("nd,nd->n", E, ahead)
         squares = np.einsum("nd,nd->n", E, E)
         across = np.maximum(squares - along**2, 0.0)
-        v = noise.across + noise.speed * q**2
+        v = noise.action + noise.speed * q**2
         ranks = np.maximum(views.ranks, 1.0)
         log = -0.5 * (
-            across / noise.across
+            across / noise.action
             + along**2 / v
-            + (ranks - 1) * np.log(2 * np.pi * noise.across)
+            + (ranks - 1) * np.log(2 * np.pi * noise.action)
             + np.log(2 * np.pi * v)
         )
         log[views.ranks < 0.5] = 0.0  # nothing is seen behind a projection that lets nothing through
-        gradient = E / noise.across
+        gradient = E / noise.action
         information = 1 / v
         if noise.speed:
             # By the direction of p, across which v is not the variance, and by its length.
             aside = E - along[:, None] * ahead
-            turning = (1 + noise.speed * q * along / v) / noise.across
+            turning = (1 + noise.speed * q * along / v) / noise.action
             slope = 2 * noise.speed * q
             lengthening = along / v + 0.5 * slope / v * (along**2 / v - 1)
             gradient = turning[:, None] * aside + lengthening[:, None] * ahead
@@ -141,11 +141,11 @@ class Constrained:
         noise, sphere = views.noise, views.sphere
         d = views.U.shape[1]
         r2 = np.einsum("nd,nd->n", views.U, views.U)
-        by_share = noise.misfit + noise.speed * r2
+        by_share = noise.speed * r2
         variance = noise.action + sphere.share * by_share
         density = blurred(sphere, variance)
         gradient = density.by_policy
-        if noise.misfit or noise.speed:
+        if noise.speed:
             across = sphere.from_center + sphere.radius
             safe = np.where(across > 0, across, 1.0)
             change = -density.by_variance * by_share * sphere.share / safe

@@ -332,7 +332,7 @@ class Policy(RegressorMixin, BaseEstimator):
         decay = self.model_.decay(moments)
         belief = self.solution_.belief
         if belief is not None:
-            return Posterior.of(moments, decay=decay, noise=belief.noise.across / self.solution_.evidence)
+            return Posterior.of(moments, decay=decay, noise=belief.noise.action / self.solution_.evidence)
         return Posterior.of(moments, self.n_actions_ if self.risk == "direct" else 1, decay)
 
     def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:

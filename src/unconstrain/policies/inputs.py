@@ -35,7 +35,8 @@ def unpack_demonstrations(
     U : array_like of shape (N, d), optional
         Actions; None beside Demonstrations.
     groups : array_like of shape (N,), optional
-        Episodes; by default those of the demonstrations where there are several.
+        Episodes; by default those of the demonstrations, or five blocks of a single one, in whose order of time contact
+        is inferred.
     projections : array_like of shape (N, d, d), optional
         Nullspace projections; by default those that the demonstrations know.
 
@@ -61,8 +62,8 @@ def unpack_demonstrations(
         raise DataError(
             "demonstrations bring their own actions: give the demonstrations alone, or states and actions"
         )
-    if groups is None and X.n_episodes > 1:
-        groups = X.episodes
+    if groups is None:
+        groups = X.folds()
     return X.states, X.actions, groups, X.projections if projections is None else projections
 
 

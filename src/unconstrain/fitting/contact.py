@@ -45,7 +45,7 @@ class Belief:
     w : ndarray
         Parameters of the model.
     noise : Noise
-        Variances.
+        Variances by which samples are judged to be free or not.
     chain : Chain
         Probabilities of being free.
     drift : Drift, optional
@@ -54,6 +54,10 @@ class Belief:
         What all samples are taken for that are not known to be otherwise.
     is_cooling : bool
         Whether the noise is still being lowered, and so is larger than that of the samples.
+    residual : Noise, optional
+        Variances as they appear meanwhile, by which the policy is learnt; by default those of `noise`. The gradient of
+        a constrained sample is corrected for `(d - 1) s²`, and in many dimensions a variance that is too large makes
+        policies too large.
     """
 
     w: Floats
@@ -62,6 +66,7 @@ class Belief:
     drift: Drift | None = None
     held: str | None = None
     is_cooling: bool = False
+    residual: Noise | None = None
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,8 @@ class Found(NamedTuple):
         The projections of these.
     tally : Tally
         What the samples add up to.
+    residual : Noise, optional
+        Variances that the policy is learnt with, where they are not those of the views.
     """
 
     views: Views
@@ -143,6 +150,7 @@ class Found(NamedTuple):
     known: NDArray[np.bool_]
     projections: Floats
     tally: Tally
+    residual: Noise | None = None
 
     def expand(self) -> Expanded:
         """Expand expected log-likelihoods about the predictions, in units of what a free sample says.
@@ -152,7 +160,8 @@ class Found(NamedTuple):
         Expanded
             Of N samples.
         """
-        views, free = self.views, self.taken_whole
+        free = self.taken_whole
+        views = self.views if self.residual is None else self.views.under(self.residual)
         unit, whole, bent, sphere = views.noise.action, views.whole, views.constrained, views.sphere
         not_free = 1 - free
         along = free * (unit * whole.information - 1)
@@ -268,7 +277,7 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
         float(omega @ np.einsum("nd,nd->n", P, P)),
         float(omega.sum()),
     )
-    return Found(views, free, taken, known, rows, tally)
+    return Found(views, free, taken, known, rows, tally, belief.residual)
 
 
 def episode_starts(samples: Samples) -> NDArray[np.bool_]:

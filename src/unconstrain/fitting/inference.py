@@ -8,11 +8,12 @@
 
 A fit in memory, a stream and a cluster drive the same object. Expectation maximisation starts from ordinary
 regression, which is right where all is free, and from the inconsistency, which is right where nothing is; noise is
-lowered from what it seems to be at the start, so that no sample is judged by a policy that is not yet good. Where
-residuals are independent, a third run goes on from the better end with noise in the speed as well. What is kept is the
-simplest of "all free" and these whose held-out likelihood none of the others clearly beats: parameters are solved
-without each fold, and noise is estimated on what was held out. "All constrained" is fitted too, but only told: it
-explains anything, and where it is right inference finds it.
+lowered from what it seems to be at the start, so that no sample is judged by a policy that is not yet good. Where the
+two runs end apart, the likelier end is the start of a third, with the noise raised once more. Where residuals are
+independent, another run goes on from the better end with noise in the speed as well. What is kept is the simplest of
+"all free" and these whose held-out likelihood none of the others clearly beats: parameters are solved without each
+fold, and noise is estimated on what was held out. "All constrained" is fitted too, but only told: it explains anything,
+and where it is right inference finds it.
 """
 
 from collections.abc import Callable
@@ -40,8 +41,12 @@ MOST_PASSES, SETTLING = 60, 4
 PASSES_PER_CHOICE = 5
 """After so many passes λ is chosen anew, and once more before it is fixed."""
 
+LARGEST_STEP = 10.0
+"""By what λ may change at a choice after the first: it is judged by samples as the present λ has them, and one that is
+far too large, once chosen, would take for constrained whatever contradicts it."""
+
 HALVINGS = 5
-ENOUGH = 1e-4
+ENOUGH = 1e-3
 """Gain in log-likelihood, per sample, that is not worth another pass."""
 
 SMALLEST_SCALE, LARGEST_SCALE = 1e-120, 1e120
@@ -52,13 +57,24 @@ LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 any single sample say how fast it was."""
 
 SPEED_AT_FIRST, LARGEST_SPEED = 0.1**2, 1.0
-FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, SPEED = (
+FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN, SPEED = (
     "all free",
     "all constrained",
     "inferred, from regression",
     "inferred, from inconsistency",
+    "inferred, warmed again",
     "inferred, with noise in speed",
 )
+INFERRED = (FROM_DIRECT, FROM_INCONSISTENCY, AGAIN)
+
+WARMTH = 10.0**2
+"""By what the variance found is multiplied for the run that starts where the likelier of two ended. In many dimensions
+a free sample shows directions that no other does, is far from a policy that has not learnt them, and so is taken for
+constrained for ever; with more noise a policy that is nearly right takes it for free."""
+
+ALIKE = 1e-2
+"""Difference in log-likelihood, per sample, within which two runs ended at the same place."""
+
 INDEPENDENT = 0.5
 """Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
 
@@ -176,10 +192,12 @@ class Run:
     def _step(self, done: Accumulator, floor: float) -> None:
         belief, (tally,) = self.belief, done.total.tallies
         if done.is_judged or self.alpha is None:
-            solution = done.solve()
-            self.alpha = solution.alpha
+            chosen = done.solve().alpha
+            if self.alpha is not None:
+                chosen = float(np.clip(chosen, self.alpha / LARGEST_STEP, self.alpha * LARGEST_STEP))
+            self.alpha = chosen
             self.share_left = _share_left(done, self.alpha, tally.squares.count)
-            w = solution.w
+            w = done.solve(self.alpha).w
         else:
             w = done.solve(self.alpha).w
         shrunk = _shrinkage(done, belief.w, w)
@@ -188,7 +206,8 @@ class Run:
         if noise.action >= least or not self.cooling:
             self.cooling = False
             self.since_cool += 1
-        noise = replace(noise, action=max(noise.action, least), speed=min(noise.speed, LARGEST_SPEED))
+        residual = replace(noise, action=max(noise.action, floor), speed=min(noise.speed, LARGEST_SPEED))
+        noise = replace(residual, action=max(noise.action, least))
         self.belief = replace(
             belief,
             w=w,
@@ -196,6 +215,7 @@ class Run:
             chain=belief.chain if belief.held else tally.counts.chain(),
             drift=None if belief.drift is None else tally.drifts.estimate(),
             is_cooling=self.cooling,
+            residual=residual if self.cooling else None,
         )
 
 
@@ -369,6 +389,10 @@ class Inference:
             self._run(FROM_DIRECT, self.starts[FREE])
         elif FROM_INCONSISTENCY not in names:
             self._run(FROM_INCONSISTENCY, self.starts[CONSTRAINED])
+        elif AGAIN not in names and not self._agree():
+            end = max(self.runs[1:], key=lambda run: run.log_likelihood).end
+            warmer = replace(end.noise, action=WARMTH * end.noise.action)
+            self._run(AGAIN, replace(end, noise=warmer, chain=Chain(), residual=end.noise))
         elif not self.likelihoods:
             self._begin_comparison(self.runs)
         elif SPEED not in names and self.blank.model.n_actions > 1 and best.tally.evidence > INDEPENDENT:
@@ -379,6 +403,11 @@ class Inference:
         else:
             self._begin_comparison([run for run in self.runs if run.name not in self.likelihoods])
 
+    def _agree(self) -> bool:
+        """Whether both starts led to the same place."""
+        one, other = self.runs[1:3]
+        return abs(one.log_likelihood - other.log_likelihood) <= ALIKE * one.tally.n_samples
+
     def _go_on(self, name: str, start: Belief, alpha: float | None, **options: Any) -> None:
         """Start a short run where another ended."""
         self._run(name, start, most=SHORT_RUN, cooling=False, alpha=alpha, keeps_alpha=True, **options)
@@ -387,19 +416,20 @@ class Inference:
     def _likeliest(self) -> Run:
         """Choose the run that beats "all free" most clearly, "all free" itself if none does.
 
-        One that makes the policy implausibly large does not count, and one with more kinds of noise has to beat those
-        with fewer as clearly. What a gain counts hangs on the evidence of the run that gains, not of the one it is
-        compared with: residuals of a wrong explanation are correlated because it is wrong.
+        Of two that do, the likelier is taken if that is clear as well. One that makes the policy implausibly large does
+        not count, and one with more kinds of noise has to beat those with fewer as clearly. What a gain counts hangs on
+        the evidence of the run that gains, not of the one it is compared with: residuals of a wrong explanation are
+        correlated because it is wrong.
         """
-        free = self.runs[0]
         runs = {run.name: run for run in self.runs if run.name in self.likelihoods}
-
-        def clearest(names: tuple[str, ...], best: Run) -> Run:
-            gains = {name: self._gain(runs[name], best) for name in names if name in runs}
-            name = max(gains, key=lambda name: gains[name], default=None)
-            return best if name is None or gains[name] <= 0 else runs[name]
-
-        return clearest((SPEED,), clearest((FROM_DIRECT, FROM_INCONSISTENCY), free))
+        best = self.runs[0]
+        found = [runs[name] for name in INFERRED if name in runs]
+        clear = [run for run in found if self._gain(run, best) > 0]
+        if clear:
+            best = max(clear, key=lambda run: self._gain(run, best))
+            for other in clear:
+                best = other if self._gain(other, best) > 0 else best
+        return runs[SPEED] if SPEED in runs and self._gain(runs[SPEED], best) > 0 else best
 
     def _gain(self, run: Run, other: Run) -> float:
         """Compute by how much a run explains more than another, per sample; 0 where that is not clear."""

@@ -8,7 +8,7 @@ distribution of the distance ρ from the centre, a Rice distribution, `p(ρ) ∝
 to terms in s²/R².
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,6 +44,23 @@ class Views:
     def sphere(self) -> Sphere:
         """Where the actions lie beside the predictions' spheres."""
         return Sphere.of(self.U, self.P)
+
+    def under(self, noise: Noise) -> "Views":
+        """Look at the same samples under another noise.
+
+        Parameters
+        ----------
+        noise : Noise
+            Variances, the actions' above zero.
+
+        Returns
+        -------
+        Views
+            Which share the spheres.
+        """
+        other = replace(self, noise=noise)
+        other.__dict__["sphere"] = self.sphere
+        return other
 
     @cached_property
     def whole(self) -> "Whole":

@@ -12,6 +12,9 @@ from unconstrain.fitting.plausible import check_scale, is_plausible
 LARGEST_SHARE = 0.5
 """Share of the mean squared action that noise may be. With more, what is left of the policy hangs on its exact size."""
 
+NO_MORE, NOTHING = 1.5, 1e-4
+"""What ordinary regression leaves of free actions: at most that many times the noise, or that share of all."""
+
 ADVICE = "try the adaptive risk, or a model that fits better"
 
 
@@ -27,11 +30,15 @@ class Correction:
         Mean squared length of the actions, in the same.
     is_root : bool
         Whether that much noise explains all that the policy does not.
+    looks_free : bool
+        Whether ordinary regression explains all of every action but for that noise. If so, each action shows only
+        itself, or the noise is misfit.
     """
 
     variance: float
     scale: float
     is_root: bool
+    looks_free: bool = False
 
     @classmethod
     def of(cls, total: CorrectedMoments) -> "Correction":
@@ -54,7 +61,7 @@ class Correction:
         """
         check_scale(total.scale, "corrected")
         variance, is_root = Pencil.of(total, total.scale).find_variance()
-        return cls(variance, total.scale, is_root)
+        return cls(variance, total.scale, is_root, _looks_free(total, variance))
 
     def observed(self, part: CorrectedMoments) -> Moments:
         """Compute the moments that parameters are solved from.
@@ -153,9 +160,23 @@ class Correction:
                 f"{self.variance * n_actions / self.scale:.0%} of the mean squared action is taken for noise, so the "
                 f"corrected risk has little left to learn from: {ADVICE}"
             )
+        if self.looks_free:
+            return (
+                "ordinary regression leaves of these actions no more than the noise that the corrected risk has found, "
+                f"so nothing was in the way, or what the model misses is taken for noise: {ADVICE}"
+            )
         if not is_plausible(size, n_actions):
             return (
                 f"the policy learnt by the corrected risk is {size:.3g} times larger than what is recorded, "
                 f"which is not plausible: {ADVICE}"
             )
         return ""
+
+
+def _looks_free(total: CorrectedMoments, variance: float) -> bool:
+    whole, d = replace(total.whole, everywhere=None), total.n_actions
+    if d == 1 or not whole.n_samples:
+        return False
+    left = float(np.sum(whole.risk(whole.decompose().solve([0.0]))))
+    noise = d * variance * float(np.sum(whole.weight))
+    return left <= max(NO_MORE * noise, NOTHING * float(np.sum(whole.squares)))

@@ -12,8 +12,8 @@ The policy learnt from the same recordings in other words is the same policy, to
 - *axes of the actions* turned, with known projections: the policy turns along. It holds where every action has weights
   of its own; decoupled and potential features tie action j to state j;
 - *episodes in another order*, at a given λ. With `alpha="cv"` the first of them decide the folds, so λ may be another;
-- under the adaptive risk all of these but pieces, to the rounding that its passes add up, on a few data sets each: it
-  chooses among ends of passes, and where two of them are equally good, rounding may choose;
+- under the adaptive and the corrected risk all of these but pieces, to the rounding that passes add up, on a few data
+  sets each: the former chooses among ends of passes, and where two of them are equally good, rounding may choose;
 - *files*: the recordings in pieces, in a stream; in `partial_fit` where nothing but the standardisation is placed by
   the first piece.
 
@@ -159,11 +159,12 @@ def test_the_order_of_episodes_does_not_matter(name, seed, risk):
     assert_same(policy.predict(p.test), before)
 
 
+@pytest.mark.parametrize("risk", ["adaptive", "corrected"])
 @pytest.mark.parametrize("alpha", ALPHAS)
 @every
-def test_the_adaptive_risk_obeys_the_same_laws(name, alpha):
+def test_risks_that_find_the_noise_obey_the_same_laws(name, alpha, risk):
     def policy(X, U, groups):
-        return clone(POLICIES[name]).set_params(risk="adaptive", alpha=alpha).fit(X, U, groups=groups)
+        return clone(POLICIES[name]).set_params(risk=risk, alpha=alpha).fit(X, U, groups=groups)
 
     p = Problem(1)
     shift, unit = np.array([1000, -5]), np.array([1e3, 1e3 if name in POTENTIAL else 1e-2])

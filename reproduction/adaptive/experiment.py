@@ -9,6 +9,7 @@ from rich.console import Console
 
 from reproduction.adaptive import figures, tables
 from reproduction.adaptive.bound import is_free
+from reproduction.adaptive.closed import CLOSED
 from reproduction.adaptive.judgement import DETERMINED, EXACT
 from reproduction.adaptive.recorded import RECORDED, find_missing, list_files
 from reproduction.adaptive.settings import Part, Result
@@ -20,7 +21,7 @@ from reproduction.trials import run_trials
 from unconstrain.errors import UnconstrainError
 from unconstrain.robots import import_mujoco
 
-PARTS: dict[str, Part] = {**SIMULATED, **RECORDED}
+PARTS: dict[str, Part] = {**SIMULATED, **CLOSED, **RECORDED}
 """By name, in the order of the report."""
 
 CYCLES = ("cycle", "cycle400")
@@ -112,7 +113,9 @@ def reproduce(
     written = [tables.write_part(PARTS[name], trials_of) for name, trials_of in results.items()]
     table = "\n".join(written)
     shown, drawn = write_figures(out, _draw(results, ways))
-    kept = {name: {"ways": ways, "trials": trials_of} for name, trials_of in results.items()}
+    kept = {
+        name: {"ways": PARTS[name].ways or ways, "trials": trials_of} for name, trials_of in results.items()
+    }
     return Outcome(
         title="Which samples were free, inferred",
         table=table,
@@ -146,6 +149,7 @@ def _run_part(
     data: Path | None,
 ) -> list[Result]:
     part = PARTS[name]
+    ways = part.ways or ways
     most = part.trials
     count = most if trials is None else min(trials, most) if part.fixed else trials
     settings: dict[str, Any] = {"experiment": "adaptive", "part": name, "ways": ways, **part.settings}

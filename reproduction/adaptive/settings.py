@@ -69,6 +69,8 @@ class Part:
         "" for what is simulated with NumPy alone, "sim" for the extra of that name, "data" for recordings.
     fixed : bool
         Whether trials are the splits of recordings, of which there are no more, and not data sets.
+    ways : tuple of str
+        The ways that are compared, if not the usual ones.
     """
 
     title: str
@@ -82,3 +84,4 @@ class Part:
     told: str = "the true projections"
     needs: str = ""
     fixed: bool = False
+    ways: tuple[str, ...] = ()

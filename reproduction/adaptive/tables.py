@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from reproduction import markdown
 from reproduction.adaptive.judgement import MEAN, average, average_cells, bound_ratio, has_noise, judge_part
 from reproduction.adaptive.settings import Part, Result
-from reproduction.adaptive.ways import ADAPTIVE, TOLD, WAYS, Cell
+from reproduction.adaptive.ways import ADAPTIVE, COLUMNS, CORRECTED, TOLD, Cell
 
-FACTS = ("adaptive / told", "bound / told's", "told + bound")
+FACTS = ("adaptive / told", "corrected / told", "bound / told's", "told + bound")
 FOUND = ("σ found / true", "τ found", "free found / true", "contact right")
 
 
@@ -18,7 +18,7 @@ def write_part(part: Part, results: Sequence[Result]) -> str:
     if part.overall is not None:
         means = means | {MEAN: average_cells(means)}
     rows = {name: _row(cell) for name, cell in means.items()}
-    columns = [c for c in (*WAYS, *FACTS, *FOUND) if any(row.get(c) for row in rows.values())]
+    columns = [c for c in (*COLUMNS, *FACTS, *FOUND) if any(row.get(c) for row in rows.values())]
     verdict = [verdict.reach for verdict in verdicts.values()]
     shown = [
         *(column for column in columns if column not in FOUND),
@@ -62,9 +62,10 @@ def list_findings(parts: Mapping[str, Part], results: Mapping[str, Sequence[Resu
 
 
 def _row(cell: Cell) -> dict[str, str]:
-    row = {way: _number(cell[way]) for way in WAYS if way in cell}
-    if ADAPTIVE in cell and cell.get(TOLD):
-        row["adaptive / told"] = f"{cell[ADAPTIVE] / cell[TOLD]:.2g}"
+    row = {way: _number(cell[way]) for way in COLUMNS if way in cell}
+    for way in (ADAPTIVE, CORRECTED):
+        if way in cell and cell.get(TOLD):
+            row[f"{way} / told"] = f"{cell[way] / cell[TOLD]:.2g}"
     ratio = bound_ratio(cell)
     if ratio is not None:
         row["bound / told's"] = f"{ratio:.3g}"
@@ -74,6 +75,7 @@ def _row(cell: Cell) -> dict[str, str]:
         row["σ found / true"] = _number(cell["noise"])
         if "true noise" in cell:
             row["σ found / true"] += f" / {_number(cell['true noise'])}"
+    if "free" in cell:
         row["τ found"] = _number(cell["speed noise"])
         row["free found / true"] = f"{cell['free']:.0%}"
         if "true free" in cell:

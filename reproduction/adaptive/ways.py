@@ -19,6 +19,12 @@ Array = NDArray[np.float64]
 DIRECT, INCONSISTENCY, ADAPTIVE, TOLD = WAYS = ("direct", "inconsistency", "adaptive", "told")
 """Three risks, and the inconsistency with the true projection of every sample known: N = I where it was free."""
 
+CORRECTED = "corrected"
+"""The inconsistency less what noise adds, which has a part of its own."""
+
+COLUMNS = (DIRECT, INCONSISTENCY, CORRECTED, ADAPTIVE, TOLD)
+"""All ways in the order of tables."""
+
 LEAST_NOISE = 1e-3
 """A share of the rms action: where no noise is added, bounds are those of this much, the limit of little noise."""
 
@@ -47,7 +53,7 @@ def learn(policy: Policy, way: str, demos: Demonstrations, known: Array | None =
     policy : Policy
         Its model; it is copied, and its risk does not matter.
     way : str
-        One of `WAYS`.
+        One of `COLUMNS`.
     demos : Demonstrations
         With noise. Their projections are not looked at.
     known : ndarray of shape (N, d, d), optional
@@ -107,7 +113,7 @@ def compare_ways(
     policy : Policy
         The model of all.
     ways : tuple of str
-        Of `WAYS`.
+        Of `COLUMNS`.
     clean : Demonstrations
         To learn from, with the true policy and projections.
     test : Demonstrations
@@ -144,7 +150,7 @@ def compare_recorded(
     policy : Policy
         The model of all.
     ways : tuple of str
-        Of `WAYS`.
+        Of `COLUMNS`.
     noisy : Demonstrations
         To learn from.
     clean : Demonstrations
@@ -160,7 +166,7 @@ def compare_recorded(
     -------
     dict of str to float
         The nUPE by way; "bound" and "told bound"; "determined", the share of the policy that the known projections
-        determine; "true noise" and "true free"; what `adaptive` found, see `describe_found`.
+        determine; "true noise" and "true free"; what `adaptive` found, see `describe_found`, or `corrected`, its noise.
     """
     assert clean.projections is not None
     free = is_free(clean.projections)
@@ -170,6 +176,8 @@ def compare_recorded(
         result[way] = nupe(test, learnt.predict(test.states))
         if way == ADAPTIVE:
             result |= describe_found(learnt, noisy, free)
+        if way == CORRECTED and ADAPTIVE not in ways:
+            result["noise"] = float(learnt.noise_)
         if way == TOLD:
             report = identifiability(learnt, noisy.states, noisy.actions, projections=known)
             result["determined"] = report.determined_share

@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from unconstrain.errors import PolicyError
-from unconstrain.fitting.observation import RISKS
 from unconstrain.policies.base import Policy
 from unconstrain.selection import Row, Table, select_policy
+
+COMPARED = ("adaptive", "inconsistency", "direct")
+"""Risks that every policy is compared with: what its samples show is inferred, none of them is free, or all are."""
 
 NOTICEABLE = 0.01
 """A held-out error that is lower by less than this share is called no better: rounding reaches so far."""
@@ -33,7 +35,8 @@ class Comparison:
     policy : Policy
         Fitted to all samples.
     rows : dict of str to Row
-        How well each risk predicts held-out samples, ordinary regression last; a row's `problem` says so if its risk
+        How well each risk predicts held-out samples: ordinary regression after those that know of constraints, and the
+        policy's own risk last if it is "corrected"; a row's `problem` says so if its risk
         could not be fitted.
     measure : str
         What all are judged by, in words.
@@ -112,10 +115,11 @@ def compare_risks(
         found = select_policy("auto", X, U, groups, projections=projections, progress=progress)
         policy, chosen = found.policy, found.table
     policy.check_options()
-    by_risk = {risk: clone(policy).set_params(risk=risk) for risk in RISKS}
+    risks = dict.fromkeys((*COMPARED, policy.risk))
+    by_risk = {risk: clone(policy).set_params(risk=risk) for risk in risks}
     result = select_policy(by_risk, X, U, groups, projections=projections, progress=progress)
     problem = result.table[policy.risk].problem
     if problem is not None:
         raise PolicyError(problem)
-    rows = {risk: result.table[risk] for risk in RISKS}
+    rows = {risk: result.table[risk] for risk in risks}
     return Comparison(result.policies[policy.risk], rows, result.table.measure, chosen)

@@ -11,7 +11,7 @@ the noise points anywhere, and a candidate that follows it would seem the better
 the error is `‖N (u - p)‖²`.
 
 Candidates that share one of the other risks share what it assumes, and are compared by that: no sample free, which is
-the paper's inconsistency, or all of them.
+the paper's inconsistency, corrected for noise if their risk is, or all of them.
 """
 
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ import numpy as np
 from unconstrain.motion import directions
 
 INCONSISTENCY = "held-out inconsistency"
+CORRECTED = "held-out inconsistency, corrected for noise"
 OF_WHAT_IS_KNOWN = "held-out error of what is known"
 OF_WHOLE_ACTIONS = "held-out error of whole actions"
 OF_WHAT_IS_SHOWN = "held-out error of what is shown"

@@ -38,7 +38,14 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
 from unconstrain.fitting.solve import splits
-from unconstrain.judging import INCONSISTENCY, OF_WHAT_IS_KNOWN, OF_WHAT_IS_SHOWN, OF_WHOLE_ACTIONS, Judge
+from unconstrain.judging import (
+    CORRECTED,
+    INCONSISTENCY,
+    OF_WHAT_IS_KNOWN,
+    OF_WHAT_IS_SHOWN,
+    OF_WHOLE_ACTIONS,
+    Judge,
+)
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
@@ -209,8 +216,9 @@ def select_policy(
     The error is that of what held-out samples show: of the whole action as far as a sample was free, of what lies
     along the motion otherwise. Which samples were free is inferred, by the likeliest candidate with the risk
     "adaptive"; where there is none, and risks differ, by one made of the candidate that is least inconsistent.
-    Candidates that all have the risk "inconsistency" are judged by their inconsistency, and those that all have
-    "direct" by whole actions.
+    Candidates that all have the risk "inconsistency" are judged by their inconsistency, those that all have
+    "corrected" by the same less what noise adds (the least that any of them finds), and those that all have "direct" by
+    whole actions.
 
     Parameters
     ----------
@@ -370,6 +378,10 @@ def _choose_judge(
     inconsistency = Judge(INCONSISTENCY if projections is None else OF_WHAT_IS_KNOWN, none_free, projections)
     if risks == {"inconsistency"}:
         return inconsistency
+    if risks == {"corrected"}:
+        measure = CORRECTED if projections is None else OF_WHAT_IS_KNOWN
+        noise = min(found.policy.solution_.noise for found in held_out.values())
+        return Judge(measure, none_free, projections, noise)
     if risks == {"direct"}:
         measure = OF_WHOLE_ACTIONS if projections is None else OF_WHAT_IS_KNOWN
         return Judge(measure, np.ones(len(actions)), projections)

@@ -34,6 +34,17 @@ def test_the_policy_is_saved_and_held_against_ordinary_regression(run, movements
     assert uc.load_policy("p.skops").risk == "adaptive"
 
 
+def test_noise_can_be_corrected_for(run, movements):
+    code, out, err = run(
+        "fit", movements, *COLUMNS, "--model", "rbf", "--risk", "corrected", "--out", "p.skops"
+    )
+    assert code == 0, err
+    assert "noise: " in out
+    (learnt,) = (line for line in out.splitlines() if "corrected (saved)" in line)
+    assert share(learnt) > 0.9
+    assert uc.load_policy("p.skops").risk == "corrected"
+
+
 def test_where_nothing_is_in_the_way_that_is_said(run, tmp_path):
     write_csv(toy.demonstrate(10, noise=0.3, constrained=False, random_state=0), tmp_path / "free.csv")
     code, out, err = run("fit", "free.csv", *COLUMNS, "--model", "rbf")

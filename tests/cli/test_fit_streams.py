@@ -21,6 +21,14 @@ def touched(tmp_path):
     return written.write(tmp_path / "felt", X, U, EPISODES, TIME, [], more=known.TOUCHED).name
 
 
+def test_noise_is_found_in_a_stream(run, folder):
+    code, out, err = run("fit", folder, *COLUMNS, "--risk", "corrected", "--checkpoint", "run.npz")
+    assert code == 0, err
+    assert "noise: " in out
+    assert "λ: " in out
+    assert uc.load_policy("policy.skops").noise_ > 0
+
+
 def test_a_folder_is_read_as_a_stream(run, folder):
     code, out, err = run(
         "fit", folder, *COLUMNS, "--model", "linear", "--resumable", "--checkpoint", "run.npz"

@@ -64,6 +64,7 @@ def stock(folder: Path) -> None:
         "potential": uc.ParametricPolicy(uc.PotentialFeatures(uc.NormalizedRBF(4))),
         "local": uc.LocallyLinearPolicy(n_centers=3, centers="kmeans"),
         "direct": uc.LocallyLinearPolicy(n_centers=3, centers="grid", risk="direct"),
+        "corrected": uc.LocallyLinearPolicy(n_centers=3, centers="grid", risk="corrected"),
     }
     for name, policy in policies.items():
         policy.fit(X, U, groups=groups)

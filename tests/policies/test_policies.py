@@ -250,7 +250,7 @@ X, U = np.eye(4)[:, :2], np.ones((4, 2))
         ),
         (
             lambda: uc.ParametricPolicy(risk="naive").fit(X, U),
-            "risk must be one of 'adaptive', 'inconsistency', 'direct'",
+            "risk must be one of 'adaptive', 'corrected', 'inconsistency', 'direct'",
         ),
         (lambda: uc.ParametricPolicy(alpha="best").fit(X, U), "alpha, where it is not a number"),
         (lambda: uc.ParametricPolicy(alpha=-1).fit(X, U), "alpha must be a finite number of at least zero"),

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from reproduction.adaptive import (
+    closed,
     experiment,
     figures,
     judgement,
@@ -263,6 +264,18 @@ def test_every_cell_of_the_cycle_has_its_reach(tmp_path):
         assert free["bound"] == free["told bound"]
     assert simulated.SIMULATED["cycle"].reaches["50 % free, 0 % noise"].told == 2.0
     figures.plot_cycle([result]).savefig(tmp_path / "cycle.png")
+
+
+def test_the_closed_form_in_small():
+    part = closed.CLOSED["closed"]
+    result = closed.run_closed(part.ways, None, 0, movements=(12,), episodes=8)
+    assert "arm, 1-2-3, decoupled, 10 % noise" in result
+    clean, noisy = (result[f"limit cycle, 12 movements, 0 % free, {noise} % noise"] for noise in (0, 5))
+    assert clean["noise"] < 0.1 * noisy["noise"]
+    assert noisy["noise"] == pytest.approx(noisy["true noise"], rel=0.3)
+    table = tables.write_part(part, [result])
+    assert "| direct | inconsistency | corrected | told | corrected / told |" in table
+    assert "τ found" not in table
 
 
 def test_the_arm_in_small():

@@ -42,6 +42,16 @@ def test_a_cluster_gives_the_fit_of_all_at_once(tmp_path, client, which):
     assert policy.resume().folds.fold_of == whole.resume().folds.fold_of
 
 
+@pytest.mark.parametrize("which", [1, 2])
+def test_noise_is_found_in_one_pass(tmp_path, client, which):
+    folder = written.write(tmp_path / "parts", X, U, EPISODES, TIME, [100, 101, 333], row_group_size=40)
+    whole = policies()[which].set_params(risk="corrected").fit(X, U, groups=EPISODES)
+    policy = policies()[which].set_params(risk="corrected")
+    distributed.fit(policy, uc.open(folder, **COLUMNS), client, part_rows=70, batch_rows=30)
+    assert_same_fit(policy, whole)
+    assert policy.noise_ == pytest.approx(whole.noise_, rel=1e-9)
+
+
 @pytest.mark.parametrize("part_rows", [1, 45, 10_000])
 def test_parts_of_whole_episodes_are_differentiated(tmp_path, client, part_rows):
     time = TIME.copy()

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from unconstrain.policies.base import Policy
 
 MODELS = ("linear", "rbf", "locally-linear", "auto")
-RISKS = ("adaptive", "inconsistency", "direct")
+RISKS = ("adaptive", "corrected", "inconsistency", "direct")
 PLACEMENTS = ("grid", "kmeans", "coverage")
 PLACED = ("centers", "n_centers", "width")
 """Options of models that have centres."""
@@ -83,7 +83,7 @@ model = gathered(
             default="adaptive",
             show_default=True,
             help="What is learnt from: adaptive infers which samples were free; inconsistency takes none for free; "
-            "direct, ordinary regression, takes all.",
+            "corrected does too, less what noise adds, in one pass; direct, ordinary regression, takes all.",
             section="Model",
         ),
         option(

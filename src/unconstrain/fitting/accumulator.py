@@ -5,6 +5,7 @@ time in threads. A cluster gives each worker an empty copy, and merges what come
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +14,8 @@ import numpy as np
 from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
 from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
+from unconstrain.fitting.corrected import CorrectedMoments, Part, add_up
+from unconstrain.fitting.correction import Correction
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation, informative, observe, unknown
@@ -57,6 +60,11 @@ class Solution:
         How many independent samples one is worth, by its residuals.
     record : Record
         How that was found.
+    noise, residual : float
+        For "corrected": variance of the noise, and of what one sample shows about the policy (`Correction.residual`),
+        in squared units of the action; else NaN.
+    doubt : str
+        For "corrected": why that may be wrong, in a sentence.
     """
 
     w: np.ndarray
@@ -70,6 +78,9 @@ class Solution:
     free_share: float = math.nan
     evidence: float = 1.0
     record: "Record" = field(default_factory=lambda: Record())
+    noise: float = math.nan
+    residual: float = math.nan
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -95,7 +106,7 @@ class Accumulator:
     ----------
     model : Model
         What samples are summed under.
-    risk : {"adaptive", "inconsistency", "direct", "whole"}
+    risk : {"adaptive", "corrected", "inconsistency", "direct", "whole"}
         What a sample says of the policy; "whole" is direct where nothing is known of the projection.
     alpha : float or "cv"
         The weight decay λ; "cv" chooses it by held-out risk, which keeps the sums of each fold apart.
@@ -224,6 +235,9 @@ class Accumulator:
             return replace(
                 counts, tallies=tuple(self._compare(each, samples, fold) for each in self.compared)
             )
+        if self.risk == "corrected":
+            by_fold = _apart(counted, fold, lambda rows: self._corrected(samples, rows))
+            return replace(counts, moments=by_fold)
         if self.risk != "adaptive":
             observation = observe(self.risk, U, samples.projections, np.where(moves, r, 0.0))
             moments = self._by_fold(samples, observation, counted, fold)
@@ -231,7 +245,7 @@ class Accumulator:
         assert self.belief is not None
         found = infer(self.model, self.belief, samples)
         moments = self._by_fold(samples, found.expand(), counted, fold)
-        judges: tuple[Moments | None, ...] = ()
+        judges: tuple[Any, ...] = ()
         if self.is_judged:
             judges = self._by_fold(
                 samples, found.judge(self.scale, 0.0 if self.belief.is_cooling else None), counted, fold
@@ -338,7 +352,24 @@ class Accumulator:
         DataError
             There is nothing to learn from.
         """
-        return Moments.sum(self._folds(without))
+        return self._observed(add_up(self._folds(without)))
+
+    def by_fold(self) -> list[Moments | None]:
+        """List the moments by fold, those of "corrected" for the noise of all.
+
+        Returns
+        -------
+        list of Moments or None
+            None where a fold has no samples.
+        """
+        parts = self.total.moments
+        if self.risk != "corrected":
+            return [part if isinstance(part, Moments) else None for part in parts]
+        correction = Correction.of(add_up(self._folds(None)))
+        return [
+            part.at(correction.variance, correction.scale) if isinstance(part, CorrectedMoments) else None
+            for part in parts
+        ]
 
     def solve(self, alpha: float | str | None = None, without: int | None = None) -> Solution:
         """Solve for the parameters.
@@ -362,13 +393,37 @@ class Accumulator:
         """
         alpha = self.alpha if alpha is None else alpha
         folds = self._folds(without)
-        total = Moments.sum(folds)
+        if self.risk == "corrected":
+            return self._solve_corrected(folds, alpha)
+        total = add_up(folds)
         decay = self.model.decay(total)
         if alpha != "cv":
             return self._solution(decay.solve(total, float(alpha)), float(alpha))
         judges = [part for k, part in enumerate(self.total.judges) if part is not None and k != without]
         chosen, alphas, risk = choose_alpha(folds, self.model.decay, judges or None)
         return self._solution(decay.solve(total, chosen), chosen, alphas, risk)
+
+    def _solve_corrected(self, folds: list[Any], alpha: float | str) -> Solution:
+        """Find the noise of all folds together, and solve what is observed beyond it."""
+        total, d = add_up(folds), self.model.n_actions
+        correction = Correction.of(total)
+        observed = correction.observed(total)
+        chosen, alphas, risk = alpha, None, None
+        if chosen == "cv":
+            judges = [correction.judge(part) for part in folds]
+            chosen, alphas, risk = choose_alpha(folds, self.model.decay, judges, correction.observed)
+        w = self.model.decay(observed).solve(observed, float(chosen))
+        size = correction.size(total, w)
+        return replace(
+            self._solution(w, float(chosen), alphas, risk),
+            noise=correction.variance,
+            residual=correction.residual(d, size),
+            doubt=correction.doubt(d, size),
+        )
+
+    def _observed(self, total: Any) -> Moments:
+        """Return what parameters are solved from."""
+        return Correction.of(total).observed(total) if self.risk == "corrected" else total
 
     def _solution(
         self,
@@ -391,7 +446,7 @@ class Accumulator:
             record=self.record,
         )
 
-    def _folds(self, without: int | None) -> list[Moments]:
+    def _folds(self, without: int | None) -> list[Any]:
         folds = [part for k, part in enumerate(self.total.moments) if part is not None and k != without]
         if folds:
             if not any(np.any(part.weight) for part in folds):
@@ -405,13 +460,13 @@ class Accumulator:
 
     def _by_fold(
         self, samples: Samples, observation: Observation, counted: np.ndarray, fold: np.ndarray | None
-    ) -> tuple[Moments | None, ...]:
-        moments: list[Moments | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
-        for k in [0] if fold is None else np.unique(fold[counted]).tolist():
-            rows = counted if fold is None else counted & (fold == k)
-            if rows.any():
-                moments[k] = self._moments(samples, observation, rows)
-        return tuple(moments)
+    ) -> tuple[Part | None, ...]:
+        return _apart(counted, fold, lambda rows: self._moments(samples, observation, rows))
+
+    def _corrected(self, samples: Samples, rows: np.ndarray) -> CorrectedMoments:
+        return CorrectedMoments.of(
+            self.model, samples if rows.all() else samples.select(np.flatnonzero(rows))
+        )
 
     def _compare(self, beliefs: tuple[Belief, ...], samples: Samples, fold: np.ndarray | None) -> Tally:
         """Sum up the likelihood of samples under beliefs: one for all, or one for each fold."""
@@ -445,7 +500,7 @@ def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> 
 
     Parameters
     ----------
-    risk : {"adaptive", "inconsistency", "direct", "whole"}
+    risk : {"adaptive", "corrected", "inconsistency", "direct", "whole"}
         Under the inconsistency, a sample that does not move says something only where its projection is known and not
         zero.
     samples : Samples
@@ -463,6 +518,18 @@ def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> 
     else:
         says = moves if samples.projections is None else moves | informative(samples.projections)
     return says if samples.weights is None else says & (samples.weights > 0)
+
+
+def _apart(
+    counted: np.ndarray, fold: np.ndarray | None, add: Callable[[np.ndarray], Part]
+) -> tuple[Part | None, ...]:
+    """Add samples up fold by fold, given what adds up those that a mask (N,) names."""
+    parts: list[Part | None] = [None] * (1 if fold is None else 1 + int(fold.max(initial=0)))
+    for k in [0] if fold is None else np.unique(fold[counted]).tolist():
+        rows = counted if fold is None else counted & (fold == k)
+        if rows.any():
+            parts[k] = add(rows)
+    return tuple(parts)
 
 
 def _check_outlier(r: np.ndarray, moves: np.ndarray) -> None:

@@ -23,13 +23,13 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.errors import DataError
 from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally
 from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
+from unconstrain.fitting.plausible import check_scale, is_plausible
 from unconstrain.fitting.solve import EpisodeFolds
 
 COOLING = 0.8
@@ -48,9 +48,6 @@ far too large, once chosen, would take for constrained whatever contradicts it."
 HALVINGS = 5
 ENOUGH = 1e-3
 """Gain in log-likelihood, per sample, that is not worth another pass."""
-
-SMALLEST_SCALE, LARGEST_SCALE = 1e-120, 1e120
-"""Mean squares of the actions between which variances can be squared, and their inverses."""
 
 LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 """Deviation of the noise, as a share of the root mean square action; where speeds vary as well, a smaller one would let
@@ -84,10 +81,6 @@ that does not quite fit change slowly along an episode, and a hundred samples th
 
 DECISIVE = 20.0
 """The same of all samples together."""
-
-LARGEST_POLICY = 2.0
-"""How many times √d larger than what is recorded a policy may be. Of a large enough one anything is left: near the
-origin its sphere passes by every action. Were but one direction left to move in, √d would be about right."""
 
 SHORT_RUN, SHORTEST_RUN = 8, 2
 """Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
@@ -342,11 +335,7 @@ class Inference:
         if name == FREE:
             whole = total if total.everywhere is None else total.everywhere
             self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
-            if not SMALLEST_SCALE < self.scale < LARGEST_SCALE:
-                raise DataError(
-                    f"the actions' root mean square is {np.sqrt(self.scale):.3g}, and powers of that which the "
-                    "adaptive risk needs are no numbers any more: give the actions in another unit"
-                )
+            check_scale(self.scale, "adaptive")
             variance = _residual(done, solution.w) / d
         else:
             variance = 0.25 * self.scale / d
@@ -438,7 +427,7 @@ class Inference:
         if run.name == SPEED:  # what was held out may lie far off, and then a wider noise explains it
             gain = min(gain, (run.log_likelihood - other.log_likelihood) / n_samples)
         gain *= min(run.tally.evidence / INDEPENDENT, 1.0)
-        plausible = run.size <= LARGEST_POLICY * np.sqrt(self.blank.model.n_actions)
+        plausible = is_plausible(run.size, self.blank.model.n_actions)
         return gain if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE else 0.0
 
     def _begin_comparison(self, runs: list[Run]) -> None:

@@ -13,7 +13,8 @@ so all it uses of a sample is `Q_n` and `Q_n u_n`:
 | direct        | any                         | I    | u_n     | ‖u_n - p_n‖²     |
 
 The adaptive risk is a mixture of the first and the last, sample by sample, with weights that hang on the policy so far
-(`contact`); `Expanded` is its observation.
+(`contact`); `Expanded` is its observation. The corrected risk is that of the first two, each sample weighted by r²,
+less what noise adds to it (`corrected`).
 
 with `r = ‖u‖` and `û = u / r`. `û ûᵀ` projects onto a line that surely lies in the image of the unknown N, so the true
 policy has no inconsistency, whatever the constraints were. For every model
@@ -36,7 +37,7 @@ import numpy as np
 from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.motion import NO_MOTION, lengths
 
-RISKS = ("adaptive", "inconsistency", "direct")
+RISKS = ("adaptive", "corrected", "inconsistency", "direct")
 
 
 class Observation(Protocol):

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from unconstrain.errors import DataError
+from unconstrain.fitting.corrected import Part, add_up
 from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
 
@@ -121,8 +122,15 @@ class EpisodeFolds:
         self.fold_of = dict(zip(labels, state["folds"].tolist(), strict=True))
 
 
+def _as_it_is(part: Moments) -> Moments:
+    return part
+
+
 def choose_alpha(
-    folds: Sequence[Moments], decay_of: Callable[[Moments], Decay], judges: Sequence[Moments] | None = None
+    folds: Sequence[Part],
+    decay_of: Callable[[Moments], Decay],
+    judges: Sequence[Moments] | None = None,
+    observed: Callable[[Any], Moments] = _as_it_is,
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Choose the λ with the least risk on folds left out one at a time, or the largest that is as good.
 
@@ -131,13 +139,15 @@ def choose_alpha(
 
     Parameters
     ----------
-    folds : sequence of Moments
+    folds : sequence of Moments or CorrectedMoments
         One for each fold.
     decay_of : callable
         Says what the decay acts on where moments are solved; see `Model.decay`.
     judges : sequence of Moments, optional
         One for each fold: the risk that parameters are judged by which were learnt from the others. By default the risk
         that they were learnt by.
+    observed : callable, optional
+        Says what parameters are solved from, given the sum of some folds; by default that sum.
 
     Returns
     -------
@@ -153,14 +163,15 @@ def choose_alpha(
     DataError
         Fewer than two folds hold data.
     """
-    judges = [judge for judge, fold in zip(judges or folds, folds, strict=True) if fold.n_samples]
+    judges = judges or [observed(fold) for fold in folds]
+    judges = [judge for judge, fold in zip(judges, folds, strict=True) if fold.n_samples]
     folds = [fold for fold in folds if fold.n_samples]
     if len(folds) < 2:
         raise DataError(ONE_FOLD)
     alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS)
     error = np.zeros(N_ALPHAS)
     for i, held_out in enumerate(judges):
-        train = Moments.sum(folds[:i] + folds[i + 1 :])
+        train = observed(add_up(folds[:i] + folds[i + 1 :]))
         candidates = decay_of(train).decompose(train).solve(alphas)
         error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
     error /= sum(float(fold.weight.sum()) for fold in folds)

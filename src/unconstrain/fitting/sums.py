@@ -6,6 +6,7 @@ from itertools import zip_longest
 from typing import Any
 
 from unconstrain.fitting.contact import Tally
+from unconstrain.fitting.corrected import Part
 from unconstrain.fitting.moments import Moments
 from unconstrain.motion import NO_MOTION
 
@@ -20,7 +21,7 @@ class Sums:
     Parameters
     ----------
     moments : tuple of Moments or None
-        By fold; None where a fold has no samples.
+        By fold; None where a fold has no samples. For "corrected" they are `CorrectedMoments`.
     n_samples : int
         Samples added, including those without motion.
     n_zero : int
@@ -37,7 +38,7 @@ class Sums:
         What was found of contact and noise: one, or one for each of several beliefs that are compared.
     """
 
-    moments: tuple[Moments | None, ...] = ()
+    moments: tuple[Part | None, ...] = ()
     n_samples: int = 0
     n_zero: int = 0
     n_known: int = 0
@@ -74,8 +75,8 @@ class Sums:
             Of the same samples.
         """
 
-        def rename(parts: tuple[Moments | None, ...]) -> tuple[Moments | None, ...]:
-            renamed: list[Moments | None] = [None] * n_folds
+        def rename(parts: tuple[Any, ...]) -> tuple[Any, ...]:
+            renamed: list[Any] = [None] * n_folds
             for fold, part in enumerate(parts):
                 renamed[(fold + by) % n_folds] = part
             return tuple(renamed) if parts else ()
@@ -83,7 +84,7 @@ class Sums:
         return replace(self, moments=rename(self.moments), judges=rename(self.judges))
 
     @property
-    def present(self) -> list[Moments]:
+    def present(self) -> list[Part]:
         """The moments of the folds that have samples."""
         return [part for part in self.moments if part is not None]
 

@@ -1,5 +1,6 @@
 """What the policies share: options become a model, samples are added up, and the sums are solved."""
 
+import warnings
 from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
@@ -314,9 +315,9 @@ class Policy(RegressorMixin, BaseEstimator):
         """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
 
         With the adaptive risk the noise is that which was inferred, for as many samples as are independent. With the
-        others it is estimated: each sample is taken to show one number, or d where nothing is projected. One whose
-        projection is known may show more, which moments do not count; the noise is then overestimated, and deviations
-        err on the side of caution.
+        corrected risk it is what the noise that was found makes of the residuals. With the others it is estimated: each
+        sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
+        more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
 
         Returns
         -------
@@ -331,6 +332,8 @@ class Policy(RegressorMixin, BaseEstimator):
         moments = self.resume().moments()
         decay = self.model_.decay(moments)
         belief = self.solution_.belief
+        if self.risk == "corrected":
+            return Posterior.of(moments, decay=decay, noise=self.solution_.residual)
         if belief is not None:
             return Posterior.of(moments, decay=decay, noise=belief.noise.action / self.solution_.evidence)
         return Posterior.of(moments, self.n_actions_ if self.risk == "direct" else 1, decay)
@@ -618,7 +621,11 @@ class Policy(RegressorMixin, BaseEstimator):
     @property
     def noise_(self) -> float:
         """Standard deviation σ of the recorded actions about what policy and constraints say, in their unit."""
-        return float(np.sqrt(self._belief("noise_").noise.action))
+        if np.isfinite(self.solution_.noise):
+            return float(np.sqrt(self.solution_.noise))
+        if self.solution_.belief is None:
+            raise AttributeError('noise_ is there only after a fit with risk="adaptive" or risk="corrected"')
+        return float(np.sqrt(self.solution_.belief.noise.action))
 
     @property
     def speed_noise_(self) -> float:
@@ -665,8 +672,8 @@ class Policy(RegressorMixin, BaseEstimator):
 
     @property
     def moments_(self) -> list[Moments | None]:
-        """The moments by fold; None where a fold has no samples."""
-        return list(self.resume().total.moments)
+        """The moments by fold, those of the corrected risk for `noise_`; None where a fold has no samples."""
+        return self.resume().by_fold()
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -688,6 +695,8 @@ class Policy(RegressorMixin, BaseEstimator):
         """Become the policy that was prepared on a copy. Nothing here changes before all of it has succeeded."""
         fresh.model_, fresh.accumulator_ = accumulator.model, accumulator
         fresh.solution_, fresh.actions_are_scalars_ = accumulator.solve(), scalars
+        if fresh.solution_.doubt:
+            warnings.warn(fresh.solution_.doubt, stacklevel=3)
         for name, value in vars(fresh).items():
             setattr(self, name, value)
         if not hasattr(fresh, "feature_names_in_") and hasattr(self, "feature_names_in_"):

@@ -1,4 +1,4 @@
-"""What a policy has inferred of its recordings, in sentences."""
+"""What a policy has found out about its recordings, in sentences."""
 
 from unconstrain.fitting.inference import CONSTRAINED, FREE, SPEED
 from unconstrain.policies.base import Policy
@@ -28,8 +28,10 @@ def describe_inferred(policy: Policy) -> str:
     Returns
     -------
     str
-        A few lines; none for a policy that was learnt by another risk than the adaptive one.
+        A few lines; for the corrected risk the noise, and none for those that find out nothing.
     """
+    if policy.risk == "corrected":
+        return f"noise: {policy.noise_:.3g} in the unit of the action"
     if policy.solution_.belief is None:
         return ""
     lines = [

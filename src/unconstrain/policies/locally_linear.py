@@ -38,7 +38,7 @@ class LocallyLinearPolicy(Policy):
         Every sample has a weight of at least this in some model; with a width given it sets their number.
     n_centers : int
         How many models, where neither a width nor the centres themselves say so.
-    risk : {"adaptive", "inconsistency", "direct"}
+    risk : {"adaptive", "corrected", "inconsistency", "direct"}
         As for `ParametricPolicy`.
     alpha : "cv" or float
         As for `ParametricPolicy`; one λ for all models.

@@ -24,11 +24,12 @@ class ParametricPolicy(Policy):
     features : transformer, Features, or None
         Any scikit-learn transformer whose output is `b(x)` (`NormalizedRBF`, `SplineTransformer`, ...), shared by all
         actions; a feature map (see `features.base`); or None for the linear policy, `b(x) = (x, 1)`.
-    risk : {"adaptive", "inconsistency", "direct"}
+    risk : {"adaptive", "corrected", "inconsistency", "direct"}
         "adaptive" infers which samples were free and how noisy the actions are; it learns from the whole action of
         free samples, and from the others as far as they show the policy (`fitting.contact`). "inconsistency" learns
-        from each action along its own direction, as published. Both make use of the projections that are known.
-        "direct" is ordinary regression.
+        from each action along its own direction, as published. "corrected" does too, but takes away what noise adds, in
+        one pass (`fitting.corrected`). All three make use of the projections that are known. "direct" is ordinary
+        regression.
     alpha : "cv" or float
         The weight decay λ, a pure number: relative to what the samples say on the mean of the parameters, whatever the
         units (`fitting.decay`). Intercepts hardly decay. "cv" chooses it by held-out risk among 25 values over five
@@ -48,9 +49,10 @@ class ParametricPolicy(Policy):
         The candidates and their held-out risk, with `alpha="cv"`.
     n_samples_seen_, n_zero_actions_, n_known_constraints_ : int
         How many samples were learnt from, how many of them have no direction, and of how many the projection was known.
-    noise_, speed_noise_, free_share_ : float
-        With the adaptive risk: noise of the actions in their unit, noise of the speed as a share of it, and share of
-        samples that were free.
+    noise_ : float
+        With the adaptive or the corrected risk: noise of the actions in their unit.
+    speed_noise_, free_share_ : float
+        With the adaptive risk: noise of the speed as a share of it, and share of samples that were free.
     log_likelihood_ : float
         With the adaptive risk: of a held-out sample.
     log_likelihoods_ : dict of str to float

@@ -18,6 +18,7 @@ from sklearn.base import clone
 from unconstrain.errors import UnconstrainError
 from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.contact import Belief, Tally
+from unconstrain.fitting.corrected import CorrectedMoments
 from unconstrain.fitting.inference import Inference
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
@@ -156,7 +157,9 @@ def _check(found: dict[str, Any]) -> None:
 
 def _check_sums(sums: Sums) -> None:
     for part in (*sums.moments, *sums.judges):
-        if part is not None and not all(
+        if isinstance(part, CorrectedMoments):
+            _check_types(part, CorrectedMoments)
+        elif part is not None and not all(
             np.isfinite(each).all() for each in (part.H, part.g, part.squares, part.weight)
         ):
             raise TypeError("its sums are not finite")

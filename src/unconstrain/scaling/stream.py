@@ -42,7 +42,7 @@ from unconstrain.scaling.checkpoint import Progress
 SAMPLE_ROWS = 100_000
 ONCE = (
     'risk="adaptive" reads the data several times, and these batches can be read only once: give a list of them or a '
-    'function that returns them anew, or choose risk="inconsistency" or "direct"'
+    'function that returns them anew, or choose risk="corrected", "inconsistency" or "direct"'
 )
 
 PolicyT = TypeVar("PolicyT", bound=Policy)
@@ -96,7 +96,7 @@ def fit_stream(
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed: a random sample of the files'
         rows (all of them, if there are no more), the first rows of an iterable; of these, those that move, unless
-        the risk is "direct".
+        the risk is "direct" or "corrected".
     random_state : int
         Of that sample.
 

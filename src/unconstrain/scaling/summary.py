@@ -35,7 +35,7 @@ def describe_fit(policy: Policy) -> str:
     if accumulator.belief is not None:
         lines += _describe_contact(policy)
     chosen = f"λ: {policy.alpha_:.3g} (chosen by cross-validation)"
-    if accumulator.belief is not None or accumulator.folds is None:
+    if policy.risk == "corrected" or accumulator.belief is not None or accumulator.folds is None:
         return "\n".join([*lines, chosen] if accumulator.folds is not None else lines)
     total = accumulator.moments()
     error = float(policy.held_out_risk_[np.argmax(policy.alphas_ == policy.alpha_)])

@@ -28,6 +28,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.fitting.accumulator": ("Accumulator", "Record", "Solution"),
     "unconstrain.fitting.chain": ("Chain", "Counts"),
     "unconstrain.fitting.contact": ("Belief", "Tally"),
+    "unconstrain.fitting.corrected": ("CorrectedMoments",),
     "unconstrain.fitting.drift": ("Drift", "Drifts"),
     "unconstrain.fitting.inference": ("Inference", "Run"),
     "unconstrain.fitting.noise": ("Noise", "Squares"),
@@ -179,7 +180,25 @@ def _plausible_folds(state: Mapping[str, Any]) -> bool:
     )
 
 
+def _plausible_corrected(state: Mapping[str, Any]) -> bool:
+    along, whole, known, d = (state[name] for name in ("along", "whole", "known", "n_actions"))
+    parts = [along, whole] if known is None else [along, whole, known]
+    (*batch, P, one), (*others, M, K) = along.g.shape, whole.g.shape
+    return (
+        type(d) is int
+        and d > 0
+        and type(state["total_weight"]) is float
+        and one == 1
+        and (M, K) in ((P, 1), (P / d, d))
+        and batch == others
+        and state["n_numbers"].shape == along.squares.shape
+        and (known is None or known.g.shape == along.g.shape)
+        and len({part.everywhere is None for part in parts}) == 1
+    )
+
+
 _CHECKS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
+    "CorrectedMoments": _plausible_corrected,
     "EpisodeFolds": _plausible_folds,
     "PolynomialFeatures": _plausible_polynomials,
     "SplineTransformer": _plausible_splines,

@@ -31,7 +31,7 @@ CASES = st.sampled_from(["inconsistency", "known", "partly known", "direct"])
         uc.NormalizedRBF(9, centers="grid"),
     ],
     # Folds count samples, so where λ is cross-validated a repeated sample may lead to another λ than one of twice the
-    # weight. On the 15 samples of this check splines are led to one ten times smaller, and all others to the same. For a
+    # weight. On the 15 samples of this check splines are led to one ten times smaller, all others to the same. For a
     # given λ, weights are repetitions for every model: see the next test.
     expected_failed_checks=lambda estimator: (
         {"check_sample_weight_equivalence_on_dense_data": "folds"}

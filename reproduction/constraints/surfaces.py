@@ -134,8 +134,8 @@ def _measure_policies(estimator: Any, D: Demonstrations) -> list[PolicyErrors]:
     """Measure policies on held-out blocks, learnt with and without the learnt projections."""
     blocks = D.blocks(BLOCKS)
     models = {
-        "local models": LocallyLinearPolicy(n_centers=20, alpha="cv"),
-        "RBFs": ParametricPolicy(NormalizedRBF(25), alpha="cv"),
+        "local models": LocallyLinearPolicy(n_centers=20, risk="inconsistency", alpha="cv"),
+        "RBFs": ParametricPolicy(NormalizedRBF(25), risk="inconsistency", alpha="cv"),
     }
     result = []
     for model, policy in models.items():

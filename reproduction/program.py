@@ -158,13 +158,14 @@ _experiment(
 
 @click.command("all", cls=Command)
 @_add_options(*RUNNING, RECORDINGS)
+@click.option("--only", multiple=True, type=click.Choice(list(EXPERIMENTS)), help="Not all; may be repeated.")
 @click.option("--out", type=PATH, default=FOLDER, show_default=True, help="Folder, a folder an experiment.")
-def run_all(trials: int | None, jobs: int, recordings: Path | None, out: Path) -> None:
+def run_all(trials: int | None, jobs: int, recordings: Path | None, only: tuple[str, ...], out: Path) -> None:
     """All of them, and a page about them."""
     from reproduction.report import reproduce_all
 
     console = _console()
-    page = reproduce_all(out, trials=trials, jobs=jobs, console=console, recordings=recordings)
+    page = reproduce_all(out, trials=trials, jobs=jobs, console=console, recordings=recordings, only=only)
     console.print(f"\nreport: {page}", soft_wrap=True)
 
 

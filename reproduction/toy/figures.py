@@ -23,7 +23,8 @@ from unconstrain import demo
 from unconstrain.demo import FEW, MOVEMENTS
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, SERIES, TRUE
 
-COLORS = {"direct": DIRECT, "inconsistency": LEARNT, ADAPTIVE: SERIES[2]}
+COLORS = {"direct": DIRECT, "inconsistency": RECORDED, ADAPTIVE: LEARNT}
+"""As in the pictures of the adaptive experiment."""
 
 STYLES = {"nUPE": ("o-", 1.6), "nCPE": ("s--", 1.0)}
 """Marker and line, and width of the line, of each error."""
@@ -69,7 +70,7 @@ def plot_sweeps(results: list[Result], adaptive: list[Result]) -> Figure:
                 100 * movements / MOVEMENTS, mean, marker[0], color=TRUE, ms=7, mfc="none",
                 label=f"published, inconsistency, {error}",
             )  # fmt: skip
-    right.plot(100 * np.array(NOISE[1:]), np.square(NOISE[1:]), ":", color=RECORDED, label="noise variance")
+    right.plot(100 * np.array(NOISE[1:]), np.square(NOISE[1:]), ":", color=SERIES[2], label="noise variance")
     left.set(
         yscale="log",
         xlabel=f"size of the data set (% of {MOVEMENTS} trajectories)",

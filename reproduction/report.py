@@ -27,7 +27,13 @@ PACKAGES = ("unconstrain", "numpy", "scipy", "scikit-learn", "mujoco", "mink")
 
 
 def reproduce_all(
-    out: Path, *, trials: int | None, jobs: int, console: Console, recordings: Path | None = None
+    out: Path,
+    *,
+    trials: int | None,
+    jobs: int,
+    console: Console,
+    recordings: Path | None = None,
+    only: Sequence[str] = (),
 ) -> Path:
     """Run all experiments into folders of `out`, and write a page about them.
 
@@ -45,16 +51,27 @@ def reproduce_all(
         Where progress is shown.
     recordings : Path, optional
         The folder of the recorded surfaces, and perhaps of what else `adaptive` looks at.
+    only : sequence of str
+        Names of experiments to run; by default all.
 
     Returns
     -------
     Path
         Of `report.md`.
+
+    Raises
+    ------
+    UnconstrainError
+        If there is no such experiment or recording.
     """
+    for name in only:
+        find_experiment(name)
     check_surfaces(recordings)
     make_folder(out)
     outcomes, missing = [], {}
     for name in EXPERIMENTS:
+        if only and name not in only:
+            continue
         console.rule(name)
         options = {RECORDED[name]: recordings} if name in RECORDED else {}
         try:
@@ -65,6 +82,7 @@ def reproduce_all(
             console.print(f"{name} is left out: {error}")
             missing[name] = str(error)
     command = "python -m reproduction all"
+    command += "".join(f" --only {name}" for name in only)
     command += "" if recordings is None else " --recordings FOLDER"
     command += "" if trials is None else f" --trials {trials}"
     return write_report(outcomes, missing, out, command)

@@ -186,7 +186,8 @@ def _draw(results: dict[str, list[Result]], ways: Sequence[str]) -> dict[str, An
         figure = figures.plot_contact(clean, is_free(clean.projections), probably_free(learnt, noisy))
         drawn["contact"] = (
             figure,
-            f"The hands' ways in the ten grasps of data set 0 from above, {100 * noise:g} % noise: contact as "
-            "inferred, over contact as it was.",
+            f"The ten grasps of data set 0, {100 * noise:g} % noise. Left: the ways of both hands from above, coloured "
+            "alike, since a sample is constrained if the barrier blocks either. Right: the same over time, a pair of "
+            "bars for each grasp.",
         )
     return drawn

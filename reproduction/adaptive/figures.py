@@ -1,8 +1,10 @@
 """Errors of the four ways on the limit cycle, and contact as it was and as it is inferred."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -20,6 +22,9 @@ STYLES = {
     TOLD: (colors.TRUE, "^--", "told all projections"),
 }
 """Colour, marker and line, and label of each way."""
+
+CONTACT = LinearSegmentedColormap.from_list("contact", [colors.LEARNT, "#EEEEEE", colors.DIRECT])
+"""From free to constrained; grey where it is not decided."""
 
 
 def plot_cycle(results: Sequence[Result]) -> Figure:
@@ -45,7 +50,7 @@ def plot_cycle(results: Sequence[Result]) -> Figure:
 
 
 def plot_contact(demos: Demonstrations, free: NDArray[np.bool_], inferred: NDArray[np.float64]) -> Figure:
-    """Plot the ways of both hands from above, coloured by contact: inferred over true.
+    """Plot contact as inferred over contact as it was: along the ways of both hands from above, and over time.
 
     Parameters
     ----------
@@ -56,19 +61,40 @@ def plot_contact(demos: Demonstrations, free: NDArray[np.bool_], inferred: NDArr
     inferred : ndarray of shape (N,)
         How probably they were, as inferred.
     """
-    figure = Figure(figsize=(7.4, 7.6), layout="constrained")
-    panels = figure.subplots(2, 1, sharex=True, sharey=True)
-    for ax, shown, title in zip(
-        panels, (1 - inferred, 1.0 - free), ("contact as inferred", "contact as it was"), strict=True
-    ):
+    figure = Figure(figsize=(12.0, 7.6), layout="constrained")
+    panels = figure.subplot_mosaic([["inferred", "time"], ["true", "time"]], width_ratios=(1.3, 1.0))
+    contact = {"inferred": 1 - inferred, "true": 1.0 - free}
+    shades: dict[str, Any] = {"cmap": CONTACT, "vmin": 0.0, "vmax": 1.0}
+    for name, title in (("inferred", "contact as inferred"), ("true", "contact as it was")):
+        ax = panels[name]
         for hand in range(2):
             x, y = demos.states[:, 3 * hand], demos.states[:, 3 * hand + 1]
-            points = ax.scatter(y, x, c=shown, s=5, cmap="cividis", vmin=0.0, vmax=1.0, linewidths=0)
-        ax.set(title=title, ylabel="x / m")
+            points = ax.scatter(y, x, c=contact[name], s=10, linewidths=0, **shades)
+        ax.set(title=title, ylabel="x / m, forward")
         ax.set_aspect("equal")
+        ax.invert_xaxis()
         ax.grid(alpha=0.25)
-    panels[1].set_xlabel("y / m")
-    figure.colorbar(points, ax=panels, shrink=0.6, label="probability that the barrier blocks a hand")
+    panels["true"].set_xlabel("y / m")
+    labels = np.unique(demos.episodes)
+    for row, label in enumerate(labels):
+        of_row = demos.episodes == label
+        for name, top in (("inferred", row - 0.4), ("true", row)):
+            panels["time"].imshow(
+                contact[name][of_row][None], extent=(0, np.sum(of_row), top + 0.38, top), aspect="auto",
+                interpolation="nearest", **shades,
+            )  # fmt: skip
+    panels["time"].set(
+        xlim=(0, max(np.sum(demos.episodes == label) for label in labels)),
+        ylim=(len(labels) - 0.5, -0.6),
+        yticks=range(len(labels)),
+        yticklabels=range(1, len(labels) + 1),
+        xlabel="sample",
+        ylabel="grasp",
+        title="upper bar: as inferred, lower bar: as it was",
+    )
+    figure.colorbar(
+        points, ax=list(panels.values()), shrink=0.7, label="probability that the barrier blocks either hand"
+    )
     return figure
 
 

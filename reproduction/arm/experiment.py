@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from reproduction.adaptive_column import ADAPTIVE, run_adaptive
 from reproduction.arm import tables, trial
 from reproduction.arm.figures import plot_table
 from reproduction.outcome import Outcome, write_figures, write_json
@@ -13,7 +14,9 @@ from reproduction.trials import run_trials
 from unconstrain.errors import UnconstrainError
 from unconstrain.robots import TaskConstraint
 
-TRIALS = 100
+TRIALS, ADAPTIVE_TRIALS = 100, 10
+"""Data sets, and how many of them are learnt by risk "adaptive" as well."""
+
 MODELS = ("published", "auto")
 
 CHOICES = (
@@ -28,6 +31,7 @@ CHOICES = (
     f"the new starts are {trial.NEW_EPISODES} more.",
     "Local models decay to the linear policy of all data. λ is the same for all of them, that of 25 with the least "
     "inconsistency on episodes held out, five folds.",
+    "Risk adaptive chooses λ by the library's rule; Table I's own risk takes the λ of least held-out inconsistency.",
     "Jacobians are those of the hand in the base's frame, geometric, so rows 4 to 6 are angular velocities.",
 )
 CHOICES_AUTO = (
@@ -47,6 +51,7 @@ def reproduce(
     model: str = "published",
     constraint: str | None = None,
     physics: bool = False,
+    adaptive: int | None = None,
 ) -> Outcome:
     """Reproduce Table I: published | ours.
 
@@ -67,6 +72,8 @@ def reproduce(
         `TaskConstraint.parse`.
     physics : bool
         The arm moves by MuJoCo's dynamics instead, and is constrained by contact; needs the extra `sim`.
+    adaptive : int, optional
+        Data sets of Table I that are learnt by risk "adaptive" as well; by default 10.
 
     Returns
     -------
@@ -76,10 +83,14 @@ def reproduce(
     Raises
     ------
     UnconstrainError
-        If the model or the constraint is not known, or an option does not belong to the physics.
+        If the model or the constraint is not known, or an option does not belong to the model or to the physics.
     """
     if model not in MODELS:
         raise UnconstrainError(f"there is no model {model!r} for the arm: choose {' or '.join(MODELS)}")
+    if adaptive is not None and (physics or model != "published"):
+        raise UnconstrainError(
+            "adaptive= belongs to the published model: leave it out, or leave out model= and physics="
+        )
     if physics:
         if constraint is not None or model != "published":
             raise UnconstrainError(
@@ -89,11 +100,17 @@ def reproduce(
         from reproduction.arm.physics import experiment
 
         return experiment.reproduce(out, trials=trials, jobs=jobs, console=console)
-    return _reproduce_table(out, trials or TRIALS, jobs, console, model, constraint)
+    return _reproduce_table(out, trials or TRIALS, jobs, console, model, constraint, adaptive)
 
 
 def _reproduce_table(
-    out: Path, count: int, jobs: int, console: Console, model: str, constraint: str | None
+    out: Path,
+    count: int,
+    jobs: int,
+    console: Console,
+    model: str,
+    constraint: str | None,
+    adaptive: int | None,
 ) -> Outcome:
     constraints = trial.CONSTRAINTS if constraint is None else (_check_constraint(constraint),)
     auto = model == "auto"
@@ -111,12 +128,25 @@ def _reproduce_table(
         console=console,
         label=f"arm, {model}",
     )
+    inferred = run_adaptive(
+        partial(trial.run_adaptive_rows, constraints),
+        0 if auto else adaptive,
+        ADAPTIVE_TRIALS,
+        count,
+        out,
+        settings=settings,
+        jobs=jobs,
+        console=console,
+        label="arm",
+        file=f"{name}_{ADAPTIVE}.jsonl",
+    )
     caption = (
         f"Errors of the {'chosen' if auto else 'local linear'} models over {len(results)} data sets: mean and "
         "standard deviation, published and ours."
     )
-    shown, drawn = write_figures(out, {name: (plot_table(results), caption)})
-    files = (write_json(out / f"{name}.json", {"settings": settings, "trials": results}), *drawn, kept)
+    shown, drawn = write_figures(out, {name: (plot_table(results, inferred), caption)})
+    everything = {"settings": settings, "trials": results, ADAPTIVE: inferred}
+    files = (write_json(out / f"{name}.json", everything), *drawn, kept)
     if auto:
         return Outcome(
             title="The arm, model chosen by inconsistency alone",
@@ -128,10 +158,10 @@ def _reproduce_table(
         )
     return Outcome(
         title="The arm (Table I)",
-        table=tables.write_published_table(results),
+        table=tables.write_published_table(results, inferred),
         figures=shown,
         choices=CHOICES,
-        findings=tables.list_published_findings(results),
+        findings=tables.list_published_findings(results, inferred),
         files=files,
     )
 

@@ -7,15 +7,27 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reproduction import published
+from reproduction.adaptive_column import ADAPTIVE, name_data_sets
 from reproduction.arm.tables import ERRORS, Results, collect, list_constraints, list_nonlinear
-from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
+from unconstrain.plot.colors import DIRECT, LEARNT, SERIES, TRUE
 
 ORACLE = "#009E73"
 """Its colour."""
 
 
-def plot_table(results: Results) -> Figure:
-    """Plot the rows of Table I with p < 2: published, ours, and what else was measured; log scale, mean and s.d."""
+def plot_table(results: Results, adaptive: Results = ()) -> Figure:
+    """Plot the rows of Table I with p < 2: published, ours, and what else was measured; log scale, mean and s.d.
+
+    Parameters
+    ----------
+    results, adaptive : sequence of dict
+        What was measured on each data set, and what risk "adaptive" did, if anything.
+
+    Returns
+    -------
+    Figure
+        A panel for each error.
+    """
     has = next(iter(results[0].values()))
     series = (
         [
@@ -27,6 +39,7 @@ def plot_table(results: Results) -> Figure:
             ("inconsistency", "inconsistency", LEARNT, "o"),
             ("direct", "direct", DIRECT, "v"),
             ("oracle", "oracle", ORACLE, "^"),
+            *([(f"adaptive ({name_data_sets(adaptive)})", ADAPTIVE, SERIES[3], "D")] if adaptive else []),
         ]
     )
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
@@ -38,7 +51,8 @@ def plot_table(results: Results) -> Figure:
             means, spreads = np.array([published.ARM[key][error] for key in rows if key in published.ARM]).T
             _draw_points(ax, at[known] - 0.24, means, spreads, color=TRUE, fmt="s", label="published")
         for i, (label, name, color, marker) in enumerate(series):
-            numbers = np.array([collect(results, *key, f"{name} {error}") for key in rows])
+            of_way = adaptive if name == ADAPTIVE else results
+            numbers = np.array([collect(of_way, *key, f"{name} {error}") for key in rows])
             _draw_points(
                 ax, at - 0.08 + 0.16 * i, numbers.mean(axis=1), numbers.std(axis=1),
                 color=color, fmt=marker, label=label,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from reproduction import published
+from reproduction.adaptive_column import ADAPTIVE, name_data_sets
 from reproduction.arm.trial import CONSTRAINTS, POWERS, make_candidates, name_row
 from reproduction.markdown import table
 
@@ -15,6 +16,9 @@ Results = Sequence[dict[str, dict[str, Any]]]
 
 ERRORS = ("nUPE", "nCPE", "complementary nCPE")
 NOT_PUBLISHED = "–"
+
+NO_CONTACT = 0.999
+"""Share of samples inferred to be free above which no contact was found: here every sample is constrained."""
 
 
 def list_constraints(results: Results) -> list[str]:
@@ -35,8 +39,19 @@ def collect(results: Results, p: float, constraint: str, key: str) -> np.ndarray
     return np.array([each[key] for each in rows])
 
 
-def write_published_table(results: Results) -> str:
-    """Write Table I beside ours, then p = 2, then direct regression and the oracle."""
+def write_published_table(results: Results, adaptive: Results = ()) -> str:
+    """Write Table I beside ours, then p = 2, then direct regression and the oracle.
+
+    Parameters
+    ----------
+    results, adaptive : sequence of dict
+        What the paper's risks measured on each data set, and what risk "adaptive" did, if anything.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     ours = [
         [
             f"{p}",
@@ -47,6 +62,7 @@ def write_published_table(results: Results) -> str:
                 for cell in (
                     _published(p, constraint, error),
                     _measured(collect(results, p, constraint, f"inconsistency {error}")),
+                    *_adaptive(adaptive, p, constraint, error),
                 )
             ),
         ]
@@ -57,6 +73,7 @@ def write_published_table(results: Results) -> str:
             constraint,
             f"order {published.ARM_LINEAR_ORDER:.0e}",
             *(f"{collect(results, 2.0, constraint, f'inconsistency {error}').max():.1e}" for error in ERRORS),
+            *(f"{collect(adaptive, 2.0, constraint, f'{ADAPTIVE} nUPE').max():.1e}" for _ in adaptive[:1]),
         ]
         for constraint in list_constraints(results)
     ]
@@ -74,12 +91,16 @@ def write_published_table(results: Results) -> str:
         for p in POWERS
         for constraint in list_constraints(results)
     ]
-    columns = [f"{error} {whose}" for error in ERRORS for whose in ("published", "ours")]
+    whose = ["published", "ours", *([ADAPTIVE] if adaptive else [])]
+    columns = [f"{error} {each}" for error in ERRORS for each in whose]
     largest = [f"{error} ours, largest" for error in ERRORS]
+    largest += [f"nUPE {ADAPTIVE}, largest"] if adaptive else []
+    above = f"Errors x 10^-2, mean ± s.d.; ours over {name_data_sets(results)}"
+    above += f", {ADAPTIVE} over the first {name_data_sets(adaptive)}." if adaptive else "."
     means = ["direct published", "direct", "inconsistency", "new starts", "oracle", "models"]
     return "\n\n".join(
         [
-            f"Errors x 10^-2, mean ± s.d.; ours over {len(results)} data sets.",
+            above,
             table(["p", "constraint", *columns], ours),
             "For p = 2.0, not x 10^-2:",
             table(["constraint", "published, all errors", *largest], linear),
@@ -89,8 +110,8 @@ def write_published_table(results: Results) -> str:
     )
 
 
-def list_published_findings(results: Results) -> tuple[str, ...]:
-    """Say which of the published figures are reached, and which are not."""
+def list_published_findings(results: Results, adaptive: Results = ()) -> tuple[str, ...]:
+    """Say which of the published figures are reached, and which are not, and compare risk "adaptive"."""
     findings = []
     for p, constraint in list_nonlinear(results):
         if (p, constraint) not in published.ARM:
@@ -114,7 +135,27 @@ def list_published_findings(results: Results) -> tuple[str, ...]:
         for p, (mean, _) in published.ARM_DIRECT_NUPE.items():
             direct = collect(results, p, "1-2-3", "direct nUPE").mean()
             findings.append(f"p = {p}, 1-2-3, direct: nUPE {direct:.3f} (published {mean:.3f}).")
+    findings += [_compare_adaptive(results[: len(adaptive)], adaptive, p) for p in POWERS[:2] if adaptive]
     return tuple(findings)
+
+
+def _compare_adaptive(results: Results, adaptive: Results, p: float) -> str:
+    """Compare both risks on the same data sets, and count those in which no contact was found."""
+    compared = []
+    for constraint in list_constraints(results):
+        mine, theirs = (
+            collect(of, p, constraint, f"{risk} nUPE").mean()
+            for of, risk in ((adaptive, ADAPTIVE), (results, "inconsistency"))
+        )
+        none = int(np.sum(collect(adaptive, p, constraint, "free") > NO_CONTACT))
+        compared.append(
+            f"{constraint} {100 * mine:.3g} ({100 * theirs:.3g}"
+            + (f"; no contact in {none})" if none else ")")
+        )
+    return (
+        f"p = {p}, nUPE x 10^-2 of {ADAPTIVE}, and in brackets of the inconsistency on the same "
+        f"{name_data_sets(adaptive)}: {', '.join(compared)}."
+    )
 
 
 def _compare_order(results: Results, p: float) -> str:
@@ -204,6 +245,11 @@ def _published(p: float, constraint: str, error: str) -> str:
     if (p, constraint) not in published.ARM:
         return NOT_PUBLISHED
     return _hundredths(*published.ARM[p, constraint][error])
+
+
+def _adaptive(adaptive: Results, p: float, constraint: str, error: str) -> list[str]:
+    """Write the cell of risk "adaptive", if there is one."""
+    return [_measured(collect(adaptive, p, constraint, f"{ADAPTIVE} {error}"))] if adaptive else []
 
 
 def _counted(names: list[str]) -> str:

@@ -28,7 +28,7 @@ GRASPS, GRASP_MODELS = 10, 8
 
 MEASURED_SETTINGS = SETTINGS | {
     "sensor": [SENSOR_NOISE, THRESHOLD, MARGIN],
-    "grasps": [GRASPS, GRASP_MODELS],
+    "grasps": [GRASPS, GRASP_MODELS, "inconsistency"],
 }
 """What the results depend on besides the seed."""
 
@@ -114,8 +114,8 @@ def record_grasps(seed: int, grasps: int = GRASPS) -> tuple[Demonstrations, Demo
 
 
 def make_grasp_model() -> LocallyLinearPolicy:
-    """Make the few local models that ten grasps suffice for."""
-    return LocallyLinearPolicy(centers="kmeans", n_centers=GRASP_MODELS, alpha="cv")
+    """Make the few local models that ten grasps suffice for, fitted by inconsistency."""
+    return LocallyLinearPolicy(centers="kmeans", n_centers=GRASP_MODELS, risk="inconsistency", alpha="cv")
 
 
 def _run_grasp(seed: int) -> dict[str, float]:

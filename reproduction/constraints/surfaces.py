@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from reproduction.recordings import CURVED, FLAT, surface_file
 from unconstrain import metrics
+from unconstrain.arrays import BLOCKED
 from unconstrain.constraints.learnt import ConstantConstraint, FeatureConstraint
 from unconstrain.constraints.learnt.base import held_out_projections
 from unconstrain.demonstrations import Demonstrations
@@ -130,12 +131,21 @@ def _measure_npoe(estimator: Any, D: Demonstrations) -> float:
     return _npoe(D.actions, held_out_projections(estimator, D.states, D.actions, D.blocks(BLOCKS)))
 
 
+def _find_known(projections: Array, U: Array) -> Array:
+    """Take a learnt projection for unknown, NaN, where it blocks much of the action that was recorded under it.
+
+    The constraint is wrong there, and the library refuses such projections.
+    """
+    blocked = np.linalg.norm(U - np.einsum("nij,nj->ni", projections, U), axis=1)
+    return np.where((blocked > BLOCKED * np.linalg.norm(U, axis=1))[:, None, None], np.nan, projections)
+
+
 def _measure_policies(estimator: Any, D: Demonstrations) -> list[PolicyErrors]:
     """Measure policies on held-out blocks, learnt with and without the learnt projections."""
     blocks = D.blocks(BLOCKS)
     models = {
-        "local models": LocallyLinearPolicy(n_centers=20, alpha="cv"),
-        "RBFs": ParametricPolicy(NormalizedRBF(25), alpha="cv"),
+        "local models": LocallyLinearPolicy(n_centers=20, risk="inconsistency", alpha="cv"),
+        "RBFs": ParametricPolicy(NormalizedRBF(25), risk="inconsistency", alpha="cv"),
     }
     result = []
     for model, policy in models.items():
@@ -144,7 +154,7 @@ def _measure_policies(estimator: Any, D: Demonstrations) -> list[PolicyErrors]:
             for train, test in splits(len(D), blocks):
                 X, U, groups = D.states[train], D.actions[train], blocks[train]
                 learnt = estimator.fit(X, U, groups=groups)
-                known = learnt.predict(X) if way == "learnt constraint" else None
+                known = _find_known(learnt.predict(X), U) if way == "learnt constraint" else None
                 P[test] = policy.fit(X, U, groups=groups, projections=known).predict(D.states[test])
                 N[test] = learnt.predict(D.states[test])
             left = np.einsum("nij,nj->ni", N, D.actions - P)

@@ -31,7 +31,7 @@ CONDITIONS = 5
 ALPHA = 1e-6
 """λ of the policies beneath the chain, which hold the truth: hardly any."""
 
-SETTINGS = {"experiment": "constraints", "noise": NOISE, "version": 1}
+SETTINGS = {"experiment": "constraints", "noise": NOISE, "version": 2}
 """What the results depend on besides the seed."""
 
 
@@ -87,10 +87,11 @@ def _run_chain(seed: int) -> dict[str, float]:
     A = rng.normal(size=(CONDITIONS, 1, 2))[condition]
     task = rng.normal(size=(1000, 1)) * np.linalg.pinv(A)[:, :, 0] * np.linalg.norm(A, axis=2)
     U = np.einsum("nij,nj->ni", projection(A), Pi) + task * np.sqrt(np.mean(Pi**2))
-    chain = ConstraintChain(ConstantConstraint(1), ParametricPolicy(alpha=ALPHA), NullspaceComponent())
+    linear = ParametricPolicy(risk="inconsistency", alpha=ALPHA)
+    chain = ConstraintChain(ConstantConstraint(1), linear, NullspaceComponent())
     ways: dict[str, Any] = {
         "component, constraint, policy": chain.fit(X, U, conditions=condition),
-        "inconsistency": ParametricPolicy(alpha=ALPHA).fit(X, U),
+        "inconsistency": clone(linear).fit(X, U),
         "direct": ParametricPolicy(risk="direct", alpha=ALPHA).fit(X, U),
     }
     return {

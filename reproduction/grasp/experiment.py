@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from reproduction.adaptive_column import ADAPTIVE, run_adaptive
 from reproduction.grasp import figures, trial
 from reproduction.grasp import video as films
 from reproduction.grasp.tables import list_findings, write_table
@@ -18,7 +19,8 @@ from reproduction.plants.grasping import ALPHA, DURATION, RATE, SIGMA_SQUARED, D
 from reproduction.plants.robot_choice import RobotChoice
 from reproduction.trials import run_trials
 
-TRIALS = 50
+TRIALS, ADAPTIVE_TRIALS = 50, 10
+"""Data sets, and how many of them are learnt by risk "adaptive" as well."""
 
 
 def reproduce(
@@ -33,6 +35,7 @@ def reproduce(
     hands: str | Iterable[str] = (),
     feet: str | Iterable[str] = (),
     video: str | os.PathLike[str] | None = None,
+    adaptive: int | None = None,
 ) -> Outcome:
     """Run the trials, and write Table II, Figs. 5 and 6, and the JSON of all trials into `out`.
 
@@ -52,6 +55,8 @@ def reproduce(
         Another robot, as for `Humanoid.load`.
     video : str or path, optional
         An .mp4 file to write as well.
+    adaptive : int, optional
+        Data sets that are learnt by risk "adaptive" as well; by default 10.
 
     Returns
     -------
@@ -69,17 +74,29 @@ def reproduce(
     if video is not None:
         films.check_video(video)
     settings = {"experiment": "grasp", "model": model, "robot": asdict(choice), "rate": RATE, "version": 1}
+    count = trials or TRIALS
     results = run_trials(
         partial(trial.run_trial, choice=choice, name=model),
-        trials or TRIALS,
+        count,
         out / "trials.jsonl",
         settings=settings,
         jobs=jobs,
         console=console,
         label="grasp",
     )
-    table = write_table(results)
-    written = write_results(out, {"settings": settings, "trials": results}, table)
+    inferred = run_adaptive(
+        partial(trial.run_trial, choice=choice, name=model, risks=(ADAPTIVE,)),
+        adaptive,
+        ADAPTIVE_TRIALS,
+        count,
+        out,
+        settings=settings,
+        jobs=jobs,
+        console=console,
+        label="grasp",
+    )
+    table = write_table(results, inferred)
+    written = write_results(out, {"settings": settings, "trials": results, ADAPTIVE: inferred}, table)
 
     console.print("drawing data set 0")
     recording, obstacle = trial.record_training(demonstrator, 0)
@@ -98,7 +115,7 @@ def reproduce(
         table=table,
         figures=pictures.shown,
         choices=_list_choices(demonstrator),
-        findings=(*list_findings(results), *pictures.left_out),
+        findings=(*list_findings(results, inferred), *pictures.left_out),
         files=tuple(files),
     )
 

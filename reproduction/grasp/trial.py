@@ -1,5 +1,6 @@
 """One data set of the grasp: demonstrations through gaps, the policies learnt from them, and their errors."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -23,6 +24,9 @@ Array = NDArray[np.float64]
 
 COLUMNS = tuple(published.GRASP)
 
+RISKS = ("inconsistency", "direct")
+"""The paper's."""
+
 GAP_MEAN, GAP_DEVIATION = 0.25, 0.1
 """The gap's width is drawn from this Gaussian for each movement, in metres."""
 
@@ -44,12 +48,12 @@ def measure_columns(demonstrator: Demonstrator, test: Demonstrations, P: Array) 
 
 
 def make_model(risk: str, name: str = "local") -> Policy | dict[str, Policy]:
-    """Make the model of either approach; λ by cross-validation of its risk.
+    """Make the model of an approach; λ by cross-validation of its risk.
 
     Parameters
     ----------
     risk : str
-        "inconsistency" or "direct".
+        "inconsistency", "direct" or "adaptive".
     name : str
         "local" for the 150 local models with centres by k-means, "potential" for a potential that is a polynomial of
         degree 4 in the hands' positions, "auto" for a choice of candidates, these two among them.
@@ -99,8 +103,9 @@ def run_trial(
     name: str = "local",
     n_episodes: int = 100,
     duration: float = DURATION,
+    risks: Sequence[str] = RISKS,
 ) -> dict[str, Any]:
-    """Learn one data set; normalised errors of both approaches, and what happened in it.
+    """Learn one data set; normalised errors by risk, and what happened in it.
 
     The errors named as Table II's columns are those at the states of held-out movements under training constraints,
     projected as each column says. Those that end in "moving" are errors along movements the expert makes under the
@@ -114,8 +119,8 @@ def run_trial(
     free = demonstrator.record(None, demonstrator.draw_starts(held_out, rng), duration=duration)
 
     result: dict[str, Any] = {}
-    for risk in ("inconsistency", "direct"):
-        policy, chosen = learn(train.demonstrations, risk, name if risk == "inconsistency" else "local")
+    for risk in risks:
+        policy, chosen = learn(train.demonstrations, risk, "local" if risk == "direct" else name)
         errors = measure_columns(
             demonstrator, test.demonstrations, policy.predict(test.demonstrations.states)
         )

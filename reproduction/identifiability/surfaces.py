@@ -57,7 +57,9 @@ def examine_surfaces(folder: Path) -> list[Surface]:
     """Examine both recordings of a folder, with one policy and one report on both."""
     files = [surface_file(folder, name) for name in NAMES]
     demos = load(files, state=[1, 2, 3], time="rosbagTimestamp", max_speed=1, min_duration=1)
-    policy = LocallyLinearPolicy(alpha="cv").fit(demos.states, demos.actions, groups=demos.blocks(5))
+    policy = LocallyLinearPolicy(risk="inconsistency", alpha="cv").fit(
+        demos.states, demos.actions, groups=demos.blocks(5)
+    )
     report = identifiability(policy, demos.states, demos.actions)
     of_sample = np.array([label.split("/")[0] for label in demos.episode_labels])[demos.episodes]
     result = []

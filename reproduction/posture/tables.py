@@ -5,18 +5,33 @@ from typing import Any
 import numpy as np
 
 from reproduction import markdown, published
+from reproduction.adaptive_column import ADAPTIVE, name_data_sets
 from reproduction.posture.trial import RISKS, collect
 
 
-def write_table(results: list[dict[str, Any]]) -> str:
-    """Write the errors by risk: published | ours."""
+def write_table(results: list[dict[str, Any]], adaptive: list[dict[str, Any]]) -> str:
+    """Write the errors by risk: published | ours.
+
+    Parameters
+    ----------
+    results, adaptive : list of dict
+        What the paper's risks measured on each data set, and what risk "adaptive" did, if anything.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     rows = []
-    for risk in RISKS:
-        mean, deviation = published.POSTURE_NUPE[risk]
-        ours = [markdown.mean_and_deviation(collect(results, risk, error)) for error in ("nUPE", "nCPE")]
-        rows.append([risk, f"{mean:.5f} ± {deviation:.5f}", *ours])
+    for risk in (*RISKS, *([ADAPTIVE] if adaptive else [])):
+        known = published.POSTURE_NUPE.get(risk)
+        of_risk = adaptive if risk == ADAPTIVE else results
+        ours = [markdown.mean_and_deviation(collect(of_risk, risk, error)) for error in ("nUPE", "nCPE")]
+        rows.append([risk, f"{known[0]:.5f} ± {known[1]:.5f}" if known else "", *ours])
     table = markdown.table(["risk", "nUPE published", "nUPE ours", "nCPE ours"], rows)
-    return f"{table}\n\nMean ± standard deviation over {len(results)} data sets.\n"
+    below = f"Mean ± standard deviation over {name_data_sets(results)}"
+    below += f"; of {ADAPTIVE} over the first {name_data_sets(adaptive)}" if adaptive else ""
+    return f"{table}\n\n{below}.\n"
 
 
 def list_findings(results: list[dict[str, Any]], n: int) -> tuple[str, ...]:

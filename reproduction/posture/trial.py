@@ -1,5 +1,6 @@
 """One data set of the posture: a linear policy learnt from movements with a wall in the way."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,12 +29,16 @@ def record(
 
 
 def run_trial(
-    seed: int, choice: RobotChoice = OUR_OWN, n_episodes: int = 100, length: int = 100
+    seed: int,
+    choice: RobotChoice = OUR_OWN,
+    n_episodes: int = 100,
+    length: int = 100,
+    risks: Sequence[str] = RISKS,
 ) -> dict[str, Any]:
     """Learn one data set; normalised errors on movements that were not learnt from, and what the wall did."""
     train, test, blocked = record(seed, choice, n_episodes, length)
     result: dict[str, Any] = {}
-    for risk in RISKS:
+    for risk in risks:
         policy = ParametricPolicy(risk=risk, alpha="cv")
         policy.fit(train.states, train.actions, groups=train.episodes)
         result[risk] = nupe_and_ncpe(test, policy.predict(test.states))

@@ -300,11 +300,15 @@ def test_bodies_and_physics_in_small():
 
 def test_contact_is_drawn(tmp_path):
     rng = np.random.default_rng(0)
-    demos = Demonstrations(rng.normal(size=(50, 6)), rng.normal(size=(50, 6)))
+    X, U = rng.normal(size=(2, 50, 6))
+    demos = Demonstrations(X, U, episodes=np.repeat([0, 1], [20, 30]))
     figure = figures.plot_contact(demos, rng.random(50) < 0.5, rng.random(50))
     figure.savefig(tmp_path / "contact.png")
-    inferred, true = (ax.collections for ax in figure.axes[:2])
-    assert len(inferred) == len(true) == 2
+    panels = {ax.get_title(): ax for ax in figure.axes}
+    for title in ("contact as inferred", "contact as it was"):
+        assert len(panels[title].collections) == 2, "a hand each"
+    bars = panels["upper bar: as inferred, lower bar: as it was"].images
+    assert [bar.get_array().shape for bar in bars] == [(1, 20)] * 2 + [(1, 30)] * 2
 
 
 @pytest.fixture

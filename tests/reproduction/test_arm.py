@@ -15,6 +15,9 @@ from unconstrain.errors import UnconstrainError
 
 QUIET = Console(quiet=True)
 
+RISKS = {"published": ("inconsistency", "direct", "oracle"), "adaptive": ("adaptive",)}
+"""What the trials of Table I learn by."""
+
 
 @pytest.fixture(autouse=True)
 def _one_thread():
@@ -71,21 +74,39 @@ def test_what_is_chosen_by_inconsistency_beats_the_published_model_tenfold(monke
 def test_reproduce_writes_tables_figures_and_trials(tmp_path, monkeypatch, model, powers):
     fake = partial(_numbers, model)
     monkeypatch.setattr(trial, "run_published_rows" if model == "published" else "run_auto_rows", fake)
+    monkeypatch.setattr(trial, "run_adaptive_rows", partial(_numbers, "adaptive"))
     outcome = experiment.reproduce(tmp_path, trials=3, console=QUIET, model=model)
     for text in ("64.33 ± 32.03", "1.42 ± 0.31"):
         assert text in outcome.table
     assert all(path.stat().st_size > 1000 for path in outcome.figures)
     (written,) = [path for path in outcome.files if path.suffix == ".json"]
-    trials = json.loads(written.read_text())["trials"]
+    everything = json.loads(written.read_text())
+    trials = everything["trials"]
+    assert len(everything["adaptive"]) == (3 if model == "published" else 0)
     assert len(trials) == 3
     assert set(trials[0]) == {name_row(p, c) for p in powers for c in CONSTRAINTS}
     assert outcome.findings
     assert outcome.choices
 
 
+def test_the_column_of_the_adaptive_risk_says_over_how_many_data_sets_it_is(tmp_path, monkeypatch):
+    monkeypatch.setattr(trial, "run_published_rows", partial(_numbers, "published"))
+    monkeypatch.setattr(trial, "run_adaptive_rows", partial(_numbers, "adaptive"))
+    outcome = experiment.reproduce(tmp_path, trials=3, console=QUIET, adaptive=2)
+    assert "ours over 3 data sets, adaptive over the first 2 data sets." in outcome.table
+    assert "| nUPE published | nUPE ours | nUPE adaptive |" in outcome.table
+    assert "on the same 2 data sets: 1-2-3" in outcome.findings[-1]
+    assert "no contact in 2" in outcome.findings[-1]
+    without = experiment.reproduce(tmp_path, trials=3, console=QUIET, adaptive=0)
+    assert "adaptive" not in without.table
+    assert not any("adaptive" in finding for finding in without.findings)
+    with pytest.raises(UnconstrainError, match="adaptive= belongs to the published model"):
+        experiment.reproduce(tmp_path, console=QUIET, model="auto", adaptive=2)
+
+
 def test_any_constraint_can_be_asked_for(tmp_path, monkeypatch):
     monkeypatch.setattr(trial, "run_published_rows", partial(_numbers, "published"))
-    outcome = experiment.reproduce(tmp_path, trials=2, console=QUIET, constraint="0,0,1")
+    outcome = experiment.reproduce(tmp_path, trials=2, console=QUIET, constraint="0,0,1", adaptive=0)
     assert "| 1.5 | 0,0,1 | – |" in outcome.table
     assert {path.stem for path in outcome.files} == {"table1_0_0_1"}
     one = [_numbers("auto", ("0,0,1",), seed) for seed in range(2)]
@@ -105,12 +126,12 @@ def test_a_wrong_choice_is_counted():
 def _numbers(model, constraints, seed):
     """Trials' numbers, to write tables of: errors that differ by row and candidate."""
     rng = np.random.default_rng(seed)
-    names = ("inconsistency", "direct", "oracle") if model == "published" else tuple(trial.make_candidates())
+    names = RISKS.get(model) or tuple(trial.make_candidates())
     keys = ("nUPE", "nCPE", "complementary nCPE", "new nUPE", "inconsistency", "seconds")
     scale = dict(zip(names, 10.0 ** np.arange(len(names)), strict=True))
     one = {f"{name} {key}": scale[name] * rng.uniform(0.01, 0.02) for name in names for key in keys}
-    one |= {"local models": 50, "alpha": 0.1} if model == "published" else {"chosen": "locally linear"}
-    powers = POWERS if model == "published" else POWERS[:2]
+    one |= {"local models": 50, "alpha": 0.1, "free": 1.0} if model in RISKS else {"chosen": "locally linear"}
+    powers = POWERS if model in RISKS else POWERS[:2]
     return {name_row(p, c): dict(one) for p in powers for c in constraints}
 
 

@@ -115,10 +115,14 @@ def test_grasp_reproduces_and_goes_on_from_kept_trials(tmp_path, monkeypatch, de
     )
     small |= {"inconsistency model": "local", "direct model": "local", "tracking error": 1e-4}
     small |= dict.fromkeys(facts, 0.9)
+    inferred = {"adaptive": dict.fromkeys(published.GRASP, 0.0005)}
     monkeypatch.setattr(experiment, "run_trials", lambda *_, **__: [small])
+    monkeypatch.setattr(experiment, "run_adaptive", lambda *_, **__: [inferred])
     monkeypatch.setattr(trial, "record_training", lambda *_: recorded)
     outcome = experiment.reproduce(tmp_path, trials=1, console=quiet)
-    assert "0.0056 ± 0.0022 | 0.0010 ± 0.0000 | 400 |" in outcome.table
+    assert "0.0056 ± 0.0022 | 0.0010 ± 0.0000 | 400 | 0.0005 ± 0.0000 |" in outcome.table
+    assert "over 1 data set, of adaptive over the first 1 data set." in outcome.table
+    assert any("by adaptive and in brackets by inconsistency" in finding for finding in outcome.findings)
     for path in (*outcome.figures, *outcome.files):
         assert path.stat().st_size > 0
     assert json.loads((tmp_path / "trials.json").read_text())["trials"] == [small]
@@ -127,6 +131,9 @@ def test_grasp_reproduces_and_goes_on_from_kept_trials(tmp_path, monkeypatch, de
 def test_a_trial_of_the_grasp_in_small(demonstrator):
     result = trial.run_trial(0, n_episodes=10, duration=0.4)
     assert set(published.GRASP) < set(result["direct"])
+    again = trial.run_trial(0, n_episodes=10, duration=0.4, risks=("inconsistency",))
+    assert again["inconsistency"] == result["inconsistency"], "the data set is the same whatever the risks"
+    assert "direct" not in again
     json.dumps(result)
 
 

@@ -11,6 +11,7 @@ from reproduction import published
 from reproduction.plants.posture import demonstrate
 from reproduction.plants.robot_choice import OUR_OWN
 from reproduction.posture import experiment
+from reproduction.posture.trial import RISKS
 
 pytest.importorskip("mujoco")
 
@@ -22,7 +23,7 @@ def one_thread():
 
 
 def test_one_data_set_of_the_posture_reaches_the_published_figure(tmp_path):
-    outcome = experiment.reproduce(tmp_path, trials=1, console=Console(quiet=True))
+    outcome = experiment.reproduce(tmp_path, trials=1, console=Console(quiet=True), adaptive=0)
     result = json.loads((tmp_path / "trials.json").read_text())["trials"][0]
     assert result["inconsistency"]["nUPE"] <= published.POSTURE_NUPE["inconsistency"][0]
     assert result["direct"]["nUPE"] > 50 * result["inconsistency"]["nUPE"]
@@ -30,6 +31,20 @@ def test_one_data_set_of_the_posture_reaches_the_published_figure(tmp_path):
     assert "0.00291 ± 0.00313" in outcome.table
     for path in (*outcome.figures, *outcome.files):
         assert path.stat().st_size > 0
+
+
+def test_fewer_data_sets_are_learnt_adaptively_as_the_table_says(tmp_path, monkeypatch):
+    facts = dict.fromkeys(("samples the wall blocks", "movements that meet the wall"), 0.9)
+    monkeypatch.setattr(
+        experiment,
+        "run_trial",
+        lambda seed, *, choice, risks=RISKS: (
+            {risk: {"nUPE": 0.1 * (seed + 1), "nCPE": 0.01} for risk in risks} | facts
+        ),
+    )
+    outcome = experiment.reproduce(tmp_path, trials=3, console=Console(quiet=True), adaptive=2)
+    assert "| adaptive |  | 0.15 ± 0.05 |" in outcome.table
+    assert "over 3 data sets; of adaptive over the first 2 data sets." in outcome.table
 
 
 def test_posture_demonstrations_obey_wall_and_limits():

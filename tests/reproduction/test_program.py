@@ -27,14 +27,14 @@ def program(monkeypatch, capsys, tmp_path):
 
 
 def test_an_experiment_goes_on_from_kept_trials(program, tmp_path):
-    code, out, _ = program("toy", "--trials", 1, "--jobs", 1)
+    code, out, _ = program("toy", "--trials", 1, "--jobs", 1, "--adaptive", 0)
     assert code == 0
     assert "inconsistency, 40 trajectories" in out
     assert "kept from before" not in out
     folder = tmp_path / "out" / "reproduction" / "toy"
     assert f"written: {folder.relative_to(tmp_path) / 'trials.json'}" in out
     first = (folder / "table.md").read_text()
-    code, out, _ = program("toy", "--datasets", 1, "--jobs", 1)
+    code, out, _ = program("toy", "--datasets", 1, "--jobs", 1, "--adaptive", 0)
     assert code == 0
     assert "toy: 1 of 1 are kept from before" in out
     assert (folder / "table.md").read_text() == first

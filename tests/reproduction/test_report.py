@@ -66,3 +66,9 @@ def test_what_cannot_run_is_left_out_and_recordings_go_to_those_that_look_at_the
     }
     assert asked["adaptive"] == {"data": tmp_path}
     assert asked["toy"] == {}
+    asked.clear()
+    page = report.reproduce_all(
+        tmp_path / "few", trials=None, jobs=1, console=Console(quiet=True), only=("posture", "toy")
+    )
+    assert list(asked) == ["toy", "posture"]
+    assert "`python -m reproduction all --only posture --only toy`" in page.read_text()

@@ -27,8 +27,8 @@ to be where the model is unsure:
 
     C* = S + max(0, ε² - D_S) / D_C · C,        ε² = mean e_t e_{t-1}.
 
-Noise that is itself correlated from sample to sample counts as misfit, on the side of caution. Without episodes nothing
-follows anything, and ε is zero; with a λ that is given there are no folds, and S = C.
+Noise that is itself correlated from sample to sample counts as misfit, on the side of caution. Without episodes samples
+are taken to be independent, and C* = C; with a λ that is given there are no folds, and S = C.
 
 References
 ----------
@@ -94,6 +94,9 @@ class Calibration:
         """
         assert solution.belief is not None
         noise = solution.belief.noise.action / solution.evidence
+        (tally,) = accumulator.total.tallies
+        if tally.echoing == 0:
+            return cls(noise)
         model, parts = accumulator.model, accumulator.total.moments
         folds = {k: part for k, part in enumerate(parts) if part is not None}
         of_noise, left_out = 0.0, []
@@ -109,7 +112,6 @@ class Calibration:
         found = cls(noise, 0.0, spread, len(folds))
         # Local models weigh samples by their activations, so squares are compared as means over samples.
         weight = sum(float(np.sum(part.weight)) for part in folds.values())
-        (tally,) = accumulator.total.tallies
         repeated = solution.record.repeated * weight * tally.squares.count / tally.n_samples
         of_folds = 0.0 if spread is None else sum(_explain(part, spread) for part in folds.values())
         share, share_of_spread = found._shares

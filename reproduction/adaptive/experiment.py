@@ -10,6 +10,7 @@ from rich.console import Console
 from reproduction.adaptive import figures, tables
 from reproduction.adaptive.bound import is_free
 from reproduction.adaptive.closed import CLOSED
+from reproduction.adaptive.intervals import INTERVALS
 from reproduction.adaptive.judgement import DETERMINED, EXACT
 from reproduction.adaptive.recorded import RECORDED, find_missing, list_files
 from reproduction.adaptive.settings import Part, Result
@@ -21,7 +22,7 @@ from reproduction.trials import run_trials
 from unconstrain.errors import UnconstrainError
 from unconstrain.robots import import_mujoco
 
-PARTS: dict[str, Part] = {**SIMULATED, **CLOSED, **RECORDED}
+PARTS: dict[str, Part] = {**SIMULATED, **INTERVALS, **CLOSED, **RECORDED}
 """By name, in the order of the report."""
 
 CYCLES = ("cycle", "cycle400")
@@ -48,6 +49,8 @@ CHOICES = (
     "likewise.",
     "λ is chosen for every way by its own held-out risk, five folds of episodes, also on the arm, where Table I holds "
     "out samples.",
+    "Intervals: components of the true action within ±1.645 standard deviations of the prediction, at the states "
+    "tested on; the arm's are samples held out of the same movements.",
     f"Noise of data set k has the stream (k, {NOISE_STREAM}), the same numbers at every level of noise.",
     "Recordings: where nothing constrains, ordinary regression is what is told everything, so there is no column for "
     "it. Demonstrations of handwriting are dealt out at random, the same way for every shape in a trial. Held-out "

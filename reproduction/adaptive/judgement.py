@@ -82,6 +82,9 @@ def judge(cell: Cell, reach: Reach) -> Verdict:
         others = max(cell[DIRECT], cell[INCONSISTENCY])
         reached = cell[ADAPTIVE] >= others - ALIKE * abs(others) if ADAPTIVE in cell else None
         return Verdict("≥ both others", reached)
+    if reach.inside is not None:
+        least, largest = reach.inside
+        return Verdict(f"{100 * least:g}..{100 * largest:g} %", bool(least <= cell["inside"] <= largest))
     limits = _list_limits(cell, reach)
     words = [f"≤ {words}" for words, _ in limits]
     limit = max(min((limit for _, limit in limits), default=np.inf), EXACT)

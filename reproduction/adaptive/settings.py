@@ -28,6 +28,8 @@ class Reach:
         Times the error by inconsistency.
     contact : float, optional
         The least share of samples rightly called free or constrained.
+    inside : tuple of float, optional
+        The least and the largest share of true actions in the intervals of 90 %.
     likelihood : bool
         The figures are mean log-likelihoods, and adaptive's is to be no lower than the others'.
     """
@@ -38,6 +40,7 @@ class Reach:
     direct: float | None = None
     inconsistency: float | None = None
     contact: float | None = None
+    inside: tuple[float, float] | None = None
     likelihood: bool = False
 
 

@@ -7,7 +7,14 @@ from reproduction.adaptive.judgement import MEAN, average, average_cells, bound_
 from reproduction.adaptive.settings import Part, Result
 from reproduction.adaptive.ways import ADAPTIVE, COLUMNS, CORRECTED, TOLD, Cell
 
-FACTS = ("adaptive / told", "corrected / told", "bound / told's", "told + bound")
+FACTS = (
+    "adaptive / told",
+    "corrected / told",
+    "bound / told's",
+    "told + bound",
+    "in the 90 % interval",
+    "half width / rms error",
+)
 FOUND = ("σ found / true", "τ found", "free found / true", "contact right")
 
 
@@ -71,6 +78,9 @@ def _row(cell: Cell) -> dict[str, str]:
         row["bound / told's"] = f"{ratio:.3g}"
     if has_noise(cell):
         row["told + bound"] = _number(cell[TOLD] + cell["bound"] - cell["told bound"])
+    if "inside" in cell:
+        row["in the 90 % interval"] = f"{cell['inside']:.0%}"
+        row["half width / rms error"] = f"{cell['width']:.2g}"
     if "noise" in cell:
         row["σ found / true"] = _number(cell["noise"])
         if "true noise" in cell:

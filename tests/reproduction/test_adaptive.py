@@ -15,6 +15,7 @@ from reproduction.adaptive import (
     closed,
     experiment,
     figures,
+    intervals,
     judgement,
     likelihood,
     recorded,
@@ -196,10 +197,19 @@ def test_a_cell_has_errors_bounds_and_what_was_found():
     assert 0 < clean["bound"] < cell["bound"]
 
 
+def test_intervals_are_compared_with_errors():
+    data, test = demonstrate(20, free=0.5, random_state=0), demonstrate(10, random_state=1)
+    cell = intervals.compare_intervals(demo.make_policy(), data, test, 0.05, np.random.default_rng(2))
+    assert set(cell) == {ADAPTIVE, "inside", "width"}
+    assert 0.7 <= cell["inside"] <= 1.0
+    assert 0.1 < cell["width"] < 10.0
+
+
 # --- Judgement -------------------------------------------------------------------------------------------------------
 
 CELL = {DIRECT: 1.0, INCONSISTENCY: 0.5, ADAPTIVE: 0.03, TOLD: 0.02}
 CELL |= {"bound": 0.02, "told bound": 0.01, "true noise": 0.1, "determined": 1.0, "contact right": 0.98}
+CELL |= {"inside": 0.88, "width": 1.2}
 
 
 @pytest.mark.parametrize(
@@ -216,6 +226,8 @@ CELL |= {"bound": 0.02, "told bound": 0.01, "true noise": 0.1, "determined": 1.0
         ({}, Reach(direct=1.0, inconsistency=0.1), "≤ 1 x direct, ≤ 0.1 x inconsistency", "yes"),
         ({}, Reach(told=2, contact=0.97), "≤ 2 x told, contact ≥ 97 %", "yes"),
         ({}, Reach(told=2, contact=0.99), "≤ 2 x told, contact ≥ 99 %", "no"),
+        ({}, Reach(inside=(0.85, 0.95)), "85..95 %", "yes"),
+        ({"inside": 0.96}, Reach(inside=(0.85, 0.95)), "85..95 %", "no"),
         ({}, Reach(), "", ""),
         ({ADAPTIVE: 1e-12, TOLD: 1e-16, "true noise": 0.0}, Reach(told=2), "≤ 2 x told", "yes"),
         ({ADAPTIVE: 1.1}, Reach(likelihood=True), "≥ both others", "yes"),
@@ -242,7 +254,7 @@ def test_tables_and_findings_say_what_was_reached():
     results = [{"a": CELL, "b": CELL}, {"a": CELL | {ADAPTIVE: 0.09}}]
     table = tables.write_part(part, results)
     (row,) = [line for line in table.splitlines() if line.startswith("| a |")]
-    assert row.startswith("| a | 1 | 0.5 | 0.06 | 0.02 | 3 | 2 | 0.03 | ≤ 2 x told | no |")
+    assert row.startswith("| a | 1 | 0.5 | 0.06 | 0.02 | 3 | 2 | 0.03 | 88% | 1.2 | ≤ 2 x told | no |")
     assert "| mean | 1 | 0.5 | 0.045 | 0.02 |" in table
     assert "Means over 2 data sets: errors. Told: the true projections." in table
     (finding,) = tables.list_findings({"x": part}, {"x": results})

@@ -51,6 +51,10 @@ def local(alpha="cv"):
 def assert_same(streamed, whole, rtol=1e-6, states=X):
     P = whole.predict(states)
     np.testing.assert_allclose(streamed.predict(states), P, rtol=0, atol=rtol * np.abs(P).max())
+    deviation = whole.predict(states, return_std=True)[1]
+    np.testing.assert_allclose(
+        streamed.predict(states, return_std=True)[1], deviation, rtol=0, atol=1e-4 * deviation.max()
+    )
     assert streamed.noise_ == pytest.approx(whole.noise_, rel=1e-6)
     assert streamed.free_share_ == pytest.approx(whole.free_share_, abs=1e-6)
     assert streamed.log_likelihoods_ == pytest.approx(whole.log_likelihoods_, rel=1e-6, abs=1e-6)

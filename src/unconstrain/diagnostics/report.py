@@ -124,9 +124,12 @@ class Identifiability:
 
     @cached_property
     def posterior(self) -> Posterior:
-        """The distribution of the parameters, given these recordings."""
-        moments = self.information.moments
-        return Posterior.of(moments, decay=self.policy.model_.decay(moments))
+        """The distribution of the parameters, given these recordings, as wide as what the fit held out says."""
+        moments, calibration = self.information.moments, self.policy.calibration()
+        decay = self.policy.model_.decay(moments)
+        if calibration is None:
+            return Posterior.of(moments, decay=decay)
+        return calibration.posterior(moments, decay)
 
     def covariance(self, X: ArrayLike) -> np.ndarray:
         """Compute how far the policy may be from `predict(X)`.

@@ -10,4 +10,5 @@ accumulator.py   the object that fits, streams and clusters drive: add, merge, s
 sums.py          what it holds: moments by fold, and counts
 solve.py         folds, and the choice of λ
 posterior.py     how sure a fit is
+calibration.py   how much wider that has to be, by what was held out
 """

@@ -93,10 +93,14 @@ class Record:
         Held-out log-likelihood of a sample, by what was assumed; the first is what was chosen.
     history : tuple of dict
         One for each pass: what was assumed, log-likelihood, noise, and share of free samples.
+    repeated : float
+        Mean product of held-out residuals that follow each other, ε², in squared units of the action; see
+        `fitting.calibration`.
     """
 
     log_likelihoods: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
+    repeated: float = 0.0
 
 
 class Accumulator:

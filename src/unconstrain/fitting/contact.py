@@ -91,6 +91,8 @@ class Tally:
         Sums of squared lengths, of actions and of predictions.
     n_samples : float
         How many, each counted by its weight.
+    echoing : float
+        How many numbers the residuals e_t have of which `echo` is the sum.
     """
 
     log_likelihood: float
@@ -102,6 +104,7 @@ class Tally:
     shown: float
     meant: float
     n_samples: float
+    echoing: float = 0.0
 
     def __add__(self, other: "Tally") -> "Tally":
         return Tally(
@@ -114,6 +117,7 @@ class Tally:
             self.shown + other.shown,
             self.meant + other.meant,
             self.n_samples + other.n_samples,
+            self.echoing + other.echoing,
         )
 
     @property
@@ -121,6 +125,11 @@ class Tally:
         """How many independent samples one is worth: `(1 - φ) / (1 + φ)` for residuals of correlation φ in a row."""
         correlation = np.clip(self.echo / self.energy, 0.0, MOST_CORRELATED) if self.energy > 0 else 0.0
         return float((1 - correlation) / (1 + correlation))
+
+    @property
+    def repeated(self) -> float:
+        """Mean product of residuals that follow each other, in units of their variance, never below zero."""
+        return max(self.echo, 0.0) / self.echoing if self.echoing > 0 else 0.0
 
 
 class Found(NamedTuple):
@@ -267,15 +276,18 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
         omega,
     )
     taken = np.where(known, 1.0, free)
+    echo, energy, echoing = _echo(views, taken, starts, omega)
     tally = Tally(
         float(omega @ log_likelihood),
         counts,
         _squares(views, taken, omega),
         Drifts() if steps is None else steps.sum(np.where(apart, 0.0, omega * kept)),
-        *_echo(views, taken, starts, omega),
+        echo,
+        energy,
         float(omega @ np.einsum("nd,nd->n", U, U)),
         float(omega @ np.einsum("nd,nd->n", P, P)),
         float(omega.sum()),
+        echoing,
     )
     return Found(views, free, taken, known, rows, tally, belief.residual)
 
@@ -319,8 +331,8 @@ def _squares(views: Views, free: Floats, omega: Floats) -> Squares:
     return Squares.sum(parts)
 
 
-def _echo(views: Views, free: Floats, starts: NDArray[np.bool_], omega: Floats) -> tuple[float, float]:
-    """Sum up how residuals agree with those before them, and their squares."""
+def _echo(views: Views, free: Floats, starts: NDArray[np.bool_], omega: Floats) -> tuple[float, float, float]:
+    """Sum up how residuals agree with those before them, their squares, and how many numbers they have."""
     follows = omega[1:] * ~starts[1:]
     both, neither = free[1:] * free[:-1] * follows, (1 - free[1:]) * (1 - free[:-1]) * follows
     as_free = (views.U - views.P) / np.sqrt(views.noise.action)
@@ -330,4 +342,4 @@ def _echo(views: Views, free: Floats, starts: NDArray[np.bool_], omega: Floats) 
         square = np.einsum("nd,nd->n", e, e)
         echo += float(weight @ np.einsum("nd,nd->n", e[1:], e[:-1]))
         energy += float(weight @ (square[1:] + square[:-1])) / 2
-    return echo, energy
+    return echo, energy, float(both @ views.ranks[1:] + neither.sum())

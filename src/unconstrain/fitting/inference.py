@@ -228,6 +228,7 @@ class Inference:
     compared: list[Run] = field(default_factory=list)
     noises: list[Noise] = field(default_factory=list)
     likelihoods: dict[str, float] = field(default_factory=dict)
+    repeated: dict[str, float] = field(default_factory=dict)
     starts: dict[str, Belief] = field(default_factory=dict)
     history: list[dict[str, Any]] = field(default_factory=list)
     scale: float = 1.0
@@ -281,7 +282,8 @@ class Inference:
         elif self.stage in ("noise", "likelihood"):
             self._compare(done)
         else:
-            done.record = Record(self.likelihoods, tuple(self.history))
+            repeated = self.repeated[self.compared[0].name]
+            done.record = Record(self.likelihoods, tuple(self.history), repeated)
             self.result = done
             return
         if done.folds is not None:
@@ -302,6 +304,7 @@ class Inference:
             compared=[copy(run) for run in self.compared],
             noises=list(self.noises),
             likelihoods=dict(self.likelihoods),
+            repeated=dict(self.repeated),
             starts=dict(self.starts),
             history=list(self.history),
         )
@@ -443,6 +446,10 @@ class Inference:
             self.stage = "likelihood"
             return
         self.likelihoods |= {run.name: tally.log_likelihood / tally.n_samples for run, tally in results}
+        self.repeated |= {
+            run.name: noise.action * tally.repeated
+            for (run, tally), noise in zip(results, self.noises, strict=True)
+        }
         if CONSTRAINED not in self.likelihoods:
             self._next_run()
             return

@@ -111,7 +111,7 @@ class LocalModels:
             blend = normalized_activations(block, self.centers, self.width)
             spread = spread_of(block, blend)
             apart = self._evaluate_each(block, w) - P[start : start + COVARIANCE_ROWS, None]
-            spread += np.swapaxes(apart * blend[:, :, None], 1, 2) @ apart
+            spread += posterior.apart * np.swapaxes(apart * blend[:, :, None], 1, 2) @ apart
             result[start : start + COVARIANCE_ROWS] = (spread + spread.swapaxes(1, 2)) / 2
         return result
 

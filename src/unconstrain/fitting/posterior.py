@@ -61,6 +61,8 @@ class Posterior:
         Weight decay λ.
     log_evidence : ndarray of shape (...,)
         `log p(data | λ, σ²)`.
+    apart : float
+        How many times the squares count by which local models lie apart from what they predict together.
     """
 
     mean: np.ndarray
@@ -68,6 +70,7 @@ class Posterior:
     noise: np.ndarray
     decay: np.ndarray
     log_evidence: np.ndarray
+    apart: float = 1.0
 
     @classmethod
     def of(

@@ -24,6 +24,7 @@ from unconstrain.atomic import as_path
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
+from unconstrain.fitting.calibration import Calibration
 from unconstrain.fitting.contact import Belief, infer
 from unconstrain.fitting.inference import infer_contact
 from unconstrain.fitting.model import Model
@@ -314,9 +315,10 @@ class Policy(RegressorMixin, BaseEstimator):
     def posterior(self) -> Posterior:
         """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
 
-        With the adaptive risk the noise is that which was inferred, for as many samples as are independent. With the
-        corrected risk it is what the noise that was found makes of the residuals. With the others it is estimated: each
-        sample is taken to show one number, or d where nothing is projected. One whose projection is known may show
+        With the adaptive risk the noise is that which was inferred, for as many samples as are independent, and the
+        covariance is as wide as held-out samples say (`fitting.calibration`). With the corrected risk the noise is what
+        the noise that was found makes of the residuals. With the others it is estimated: each sample is taken to show
+        one number, or d where nothing is projected. One whose projection is known may show
         more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
 
         Returns
@@ -331,12 +333,29 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         moments = self.resume().moments()
         decay = self.model_.decay(moments)
-        belief = self.solution_.belief
         if self.risk == "corrected":
             return Posterior.of(moments, decay=decay, noise=self.solution_.residual)
-        if belief is not None:
-            return Posterior.of(moments, decay=decay, noise=belief.noise.action / self.solution_.evidence)
+        calibration = self.calibration()
+        if calibration is not None:
+            return calibration.posterior(moments, decay)
         return Posterior.of(moments, self.n_actions_ if self.risk == "direct" else 1, decay)
+
+    def calibration(self) -> Calibration | None:
+        """Measure on held-out folds how wide the posterior has to be.
+
+        Returns
+        -------
+        Calibration or None
+            With the adaptive risk, what was held out says; of a policy that was saved without its sums, the noise
+            alone. None with other risks, whose noise is estimated with the posterior.
+        """
+        check_is_fitted(self)
+        belief = self.solution_.belief
+        if belief is None:
+            return None
+        if not hasattr(self, "accumulator_"):
+            return Calibration(belief.noise.action / self.solution_.evidence)
+        return Calibration.of(self.resume(), self.solution_)
 
     def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:
         """Compute how far the true policy may be from `predict`.

@@ -73,7 +73,7 @@ def reproduce(
     trial.make_model("inconsistency", model)
     if video is not None:
         films.check_video(video)
-    settings = {"experiment": "grasp", "model": model, "robot": asdict(choice), "rate": RATE, "version": 1}
+    settings = {"experiment": "grasp", "model": model, "robot": asdict(choice), "rate": RATE, "version": 2}
     count = trials or TRIALS
     results = run_trials(
         partial(trial.run_trial, choice=choice, name=model),

@@ -68,7 +68,10 @@ def make_model(risk: str, name: str = "local") -> Policy | dict[str, Policy]:
     UnconstrainError
         If there is no such model.
     """
-    local = LocallyLinearPolicy(centers="kmeans", n_centers=N_MODELS, risk=risk, alpha="cv")
+    # As published, weights decay to zero: a linear policy of all data, learnt from one number a sample, is all but
+    # undetermined here.
+    prior = "zero" if risk == "inconsistency" else "global"
+    local = LocallyLinearPolicy(centers="kmeans", n_centers=N_MODELS, risk=risk, alpha="cv", prior=prior)
     if name == "local":
         return local
     potential = ParametricPolicy(

@@ -69,9 +69,6 @@ WARMTH = 10.0**2
 a free sample shows directions that no other does, is far from a policy that has not learnt them, and so is taken for
 constrained for ever; with more noise a policy that is nearly right takes it for free."""
 
-ALIKE = 1e-2
-"""Difference in log-likelihood, per sample, within which two runs ended at the same place."""
-
 INDEPENDENT = 0.5
 """Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
 
@@ -398,7 +395,7 @@ class Inference:
     def _agree(self) -> bool:
         """Whether both starts led to the same place."""
         one, other = self.runs[1:3]
-        return abs(one.log_likelihood - other.log_likelihood) <= ALIKE * one.tally.n_samples
+        return abs(one.log_likelihood - other.log_likelihood) <= NOTICEABLE * one.tally.n_samples
 
     def _go_on(self, name: str, start: Belief, alpha: float | None, **options: Any) -> None:
         """Start a short run where another ended."""

@@ -102,7 +102,7 @@ def run_bodies(ways: tuple[str, ...], folder: Path | None, seed: int, episodes: 
     train, test, _ = posture.record(seed, n_episodes=episodes)
     demonstrator, rng = grasp.make_demonstrator(OUR_OWN), np.random.default_rng(seed)
     grasps, others = (each.demonstrations for each in grasp.record_both(demonstrator, rng, episodes))
-    local = grasp.make_model("inconsistency")
+    local = grasp.make_model("adaptive")
     assert not isinstance(local, dict)
     return {
         "posture": compare_ways(ParametricPolicy(), ways, train, test, BODY_NOISE, draw_noise(seed)),

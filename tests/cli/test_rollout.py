@@ -46,3 +46,27 @@ def test_mistakes(run, policy, tmp_path, arguments, sentence):
     assert sentence in err
     assert {p.name for p in tmp_path.iterdir()} == {policy.name}
     assert load_policy(policy).n_features_in_ == 2
+
+
+def test_a_policy_that_is_relative_to_its_goal_is_told_where_that_is(run, tmp_path):
+    t = np.arange(0, 4, 0.02)
+    rows = []
+    for episode, goal in enumerate([(1.0, 2.0), (-3.0, 1.0), (0.0, -2.0)]):
+        x = goal + np.exp(-t)[:, None] * np.array([1.0, -1.0 + episode])
+        rows.append(np.column_stack([np.full(len(t), episode), t, x]))
+    np.savetxt("reach.csv", np.concatenate(rows), delimiter=",", header="run,t,x,y", comments="")
+    code, out, err = run(
+        *("fit", "reach.csv", "--state", "x,y", "--time", "t", "--episode", "run", "--relative-to", "goal"),
+        *("--model", "linear", "--out", "reach.skops"),
+    )
+    assert code == 0, err
+    assert "states are relative to where each episode ends" in out
+    assert '--goal="0,0"' in out
+    code, _, err = run("rollout", "reach.skops", "--start", "6,5")
+    assert code == 2
+    assert "say where that is with --goal" in err
+    code, _, err = run("rollout", "reach.skops", "--start", "6,5", "--goal", "5,5", "--steps", 400)
+    assert code == 0, err
+    path = np.genfromtxt("rollout.csv", delimiter=",", names=True)
+    assert path["x"][0] == 6.0
+    assert abs(path["x"][-1] - 5.0) < 0.1

@@ -10,6 +10,7 @@ from unconstrain.cli.command import command
 from unconstrain.cli.declared import option
 from unconstrain.errors import PolicyError
 from unconstrain.progress import working
+from unconstrain.recordings.relative import START
 
 if TYPE_CHECKING:
     from unconstrain.comparison import Comparison
@@ -121,7 +122,8 @@ def fit(
     _describe(comparison, demos)
     if figure is not None:
         reporting.say(f"figure: {figure}")
-    _suggest(out, demos)
+    to = recorded.columns.relative_to
+    _suggest(out, demos, needs_goal=to is not None and to != START)
 
 
 def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) -> "Comparison":
@@ -187,7 +189,7 @@ def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
         )
 
 
-def _suggest(out: Path, demos: "Demonstrations | None" = None) -> None:
+def _suggest(out: Path, demos: "Demonstrations | None" = None, *, needs_goal: bool = False) -> None:
     """Name the commands that come next; with the recordings, a start for a rollout."""
     reporting.say(f"policy: {out}")
     reporting.say("\nnext, on recordings the policy has not seen, or to see where it leads:")
@@ -195,8 +197,11 @@ def _suggest(out: Path, demos: "Demonstrations | None" = None) -> None:
     if demos is not None and demos.states.shape[1] == demos.actions.shape[1]:
         first, scales = demos.states[0], demos.states.std(axis=0)
         start = ",".join(reporting.shown_number(*pair) for pair in zip(first, scales, strict=True))
+        # The start is one of those learnt from, so it is relative already, to a goal at the origin.
+        goal = f' --goal="{",".join("0" * len(first))}"' if needs_goal else ""
         reporting.say(
-            f'  unconstrain rollout {reporting.shell_word(out)} --start="{start}" --steps 500 --dt 0.02 --overwrite'
+            f'  unconstrain rollout {reporting.shell_word(out)} --start="{start}"{goal} '
+            "--steps 500 --dt 0.02 --overwrite"
         )
 
 

@@ -1,5 +1,6 @@
 """`unconstrain rollout`: where a policy leads, free or under a constraint."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,12 @@ from unconstrain.cli.command import command
 from unconstrain.cli.declared import Number, Numbers
 from unconstrain.errors import DataError
 from unconstrain.progress import working
+from unconstrain.recordings.relative import START
 
 if TYPE_CHECKING:
     import numpy as np
 
+    from unconstrain.policies.base import Policy
     from unconstrain.policies.unsure import Unsure
 
 
@@ -41,6 +44,12 @@ if TYPE_CHECKING:
     help='A row of the constraint A, A u = 0: --block="1,0,0". May be given several times.',
 )
 @click.option(
+    "--goal",
+    type=Numbers(),
+    help="Where the goal is, for a policy learnt with --relative-to goal; for one that is relative to columns, what "
+    "those would hold.",
+)
+@click.option(
     "--stop-when-unsure",
     type=Number(),
     help="End where the policy's standard deviation exceeds this share of its speed: 0.5, say.",
@@ -54,6 +63,7 @@ def rollout(
     steps: int,
     dt: float,
     block: tuple[list[float], ...],
+    goal: list[float] | None,
     stop_when_unsure: float | None,
     out: Path,
     figure: Path,
@@ -74,15 +84,18 @@ def rollout(
     _check_length(start, "start=", learnt.n_features_in_, "states")
     for row in block:
         _check_length(row, "block=", learnt.n_actions_, "actions")
+    origin = _find_origin(learnt, start, goal)
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
     with working("rolling out"):
-        movement = integrate(learnt, start, steps, dt, list(block) or None, stop_when=unsure)
+        inside = [at - zero for at, zero in zip(start, origin, strict=True)]
+        movement = integrate(learnt, inside, steps, dt, list(block) or None, stop_when=unsure)
     taken = len(movement) - 1
     if unsure is not None and taken == 0:
         raise DataError(
             f"at the start already {_unsure_at(unsure, movement.states[0])}: start nearer to the recordings, or give a "
             "larger share to stop_when_unsure="
         )
+    movement = replace(movement, states=movement.states + origin)
     write_csv(movement, out)
     plot.save(plot.rollout_figure(movement), figure)
     end = zip(movement.state_names, movement.states[-1], movement.states.std(axis=0), strict=True)
@@ -91,6 +104,27 @@ def rollout(
     if unsure is not None and taken < steps:
         reporting.say(f"stopped after {taken} of {steps} steps: {_unsure_at(unsure, movement.states[-1])}")
     reporting.say(f"movement: {out}\nfigure: {figure}")
+
+
+def _find_origin(learnt: "Policy", start: list[float], goal: list[float] | None) -> list[float]:
+    """Return what the states of the policy are relative to, as states (n,): zeros where they are not."""
+    recording = getattr(learnt, "recording_", None)
+    columns, preparation = recording if recording is not None else (None, None)
+    to = None if columns is None else columns.relative_to
+    if goal is not None:
+        if to is None or to == START:
+            raise DataError("goal= is for a policy learnt relative to a goal or to columns; leave it out")
+        _check_length(goal, "goal=", learnt.n_features_in_, "states")
+        return goal
+    if to == START:
+        return start
+    if to is not None:
+        raise DataError(
+            "the policy was learnt relative to a goal or to columns: say where that is with goal=, one number a state"
+        )
+    if preparation is not None and preparation.moving_centre is not None:
+        reporting.say("note: start and movement are relative to the moving centre")
+    return [0.0] * len(start)
 
 
 def _check_length(numbers: list[float], option: str, wanted: int, of: str) -> None:

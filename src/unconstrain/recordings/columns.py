@@ -40,6 +40,10 @@ class Columns:
         The nullspace projection of each sample: one column of lists of d² numbers, row by row, or d² columns. Empty or
         NaN where it is not known.
 
+    relative_to : "start", "goal", or list of columns
+        What states are relative to: where each episode starts, or ends; or as many columns as there are states, such as
+        an object's position. Given actions are made relative to columns that move as well, which needs `time`.
+
     Raises
     ------
     DataError
@@ -54,9 +58,10 @@ class Columns:
     force: Keys | None = None
     free: Key | None = None
     projections: Keys | None = None
+    relative_to: Keys | None = None
 
     def __post_init__(self) -> None:
-        for name in ("state", "action", "force", "projections"):
+        for name in ("state", "action", "force", "projections", "relative_to"):
             keys = getattr(self, name)
             if isinstance(keys, str | int | list | tuple | None):
                 continue
@@ -68,6 +73,8 @@ class Columns:
                     f"{name} takes column names or positions counted from 0, got {shown:.60}"
                 ) from None
             object.__setattr__(self, name, plain)
+        if self.relative_to in (["start"], ["goal"]):  # as the command line gives them
+            object.__setattr__(self, "relative_to", self.relative_to[0])
         for name in ("time", "episode", "free"):
             key = getattr(self, name)
             if not isinstance(key, str | Integral | None):

@@ -19,6 +19,7 @@ from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.recording import Recording
+from unconstrain.recordings.relative import GOAL, START
 from unconstrain.recordings.roles import assign_roles
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.tables import Tables
@@ -78,7 +79,7 @@ def open_demonstrations(demos: Demonstrations, columns: Columns, preparation: Pr
     demos : Demonstrations
         They know their own columns.
     columns : Columns
-        As given; nothing but `action` may be.
+        As given; nothing but `action` may be, and the start or goal that states are relative to.
     preparation : Preparation
         As given.
 
@@ -92,7 +93,8 @@ def open_demonstrations(demos: Demonstrations, columns: Columns, preparation: Pr
     DataError
         Columns are given.
     """
-    if columns != replace(Columns(), action=columns.action):
+    ends = columns.relative_to if columns.relative_to in (START, GOAL) else None
+    if columns != replace(Columns(), action=columns.action, relative_to=ends):
         raise DataError("demonstrations know their columns: choose among them with select, or give a file")
     arrays = demonstrations_file.arrays_of(demos)
     about = demonstrations_file.describe(demos, {name: name for name in arrays})

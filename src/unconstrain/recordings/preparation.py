@@ -31,6 +31,10 @@ class Preparation:
         Fragments of a split episode that are shorter than this (s) are dropped. Episodes that were not split stay.
     force_threshold : float, optional
         A force above this, in its own unit, is a contact. Needed where `force` is given.
+    moving_centre : float, optional
+        States and actions are taken relative to their mean over so many seconds (the standard deviation of a Gaussian),
+        for movements such as circles about a centre that wanders. Several times shorter than it wanders, and longer
+        than a turn takes.
 
     Raises
     ------
@@ -45,6 +49,7 @@ class Preparation:
     min_speed: float | None = None
     min_duration: float | None = None
     force_threshold: float | None = None
+    moving_centre: float | None = None
 
     def __post_init__(self) -> None:
         unit = self.time_unit

@@ -35,6 +35,7 @@ from unconstrain.recordings.pieces import (
     read_projections,
 )
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.relative import describe, end_of, moving_centre
 from unconstrain.recordings.roles import Roles
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.time import Clock
@@ -112,6 +113,11 @@ class Recording:
         return self.differentiates or not (self.preparation.gap is self.preparation.max_speed is None)
 
     @property
+    def is_relative(self) -> bool:
+        """Whether states are taken relative to something."""
+        return not (self.columns.relative_to is self.preparation.moving_centre is None)
+
+    @property
     def reads_projections(self) -> bool:
         """Whether files hold the projections."""
         return bool(self.roles.projections) and not self.makes_projections
@@ -140,6 +146,8 @@ class Recording:
         """What is done with a sample that takes its neighbours, where anything is."""
         if self.splits:
             return "differentiate" if self.differentiates else "split"
+        if self.is_relative:
+            return "find what is relative in"
         return "filter the forces of" if self.makes_projections and self.roles.force else None
 
     def read_pieces(
@@ -286,8 +294,9 @@ class Recording:
         fields = [*roles.state, *roles.action]
         columns: tuple[ColumnKey, ...] = ()
         made = self.makes_projections
-        if roles.time is not None and (everything or self.splits):
+        if roles.time is not None and (everything or self.splits or self.is_relative):
             fields.append(roles.time)
+        fields += roles.reference
         if everything or self.reads_projections:
             columns = roles.projections
         if everything or made:
@@ -352,7 +361,12 @@ class Recording:
         codes, origins = episodes.codes, [(code, 0) for code in range(len(episodes.labels))]
         notes: tuple[Note, ...] = ()
         rows = np.arange(len(X))
-        if roles.time is not None and (everything or self.splits):
+        reference = None
+        if roles.reference:
+            reference = np.ascontiguousarray(
+                read_numbers(pieces, roles.reference, "relative_to").T, dtype=np.float64
+            )
+        if roles.time is not None and (everything or self.splits or self.is_relative):
             time = self._seconds(pieces, codes)
             notes = () if self._saved else self.clock.note(self.name)
             if self.splits or not self._saved:
@@ -360,12 +374,24 @@ class Recording:
                 notes += self._notes(found)
                 rows, codes, origins = found.samples, found.episodes, list(found.origins)
                 X, U, time = X[rows], U[rows], time[rows]
-                forces, free, policy, N = (None if a is None else a[rows] for a in (forces, free, policy, N))
-        if self.differentiates and len(X):
-            assert time is not None
+                forces, free, policy, N, reference = (
+                    None if a is None else a[rows] for a in (forces, free, policy, N, reference)
+                )
+        if len(X) and (self.differentiates or self.is_relative):
             order = np.argsort(codes, kind="stable")
             for own in np.split(order, np.cumsum(np.bincount(codes))[:-1]):
-                U[own] = differentiate(X[own], time[own], window=self.preparation.window)
+                stamps = None if time is None else time[own]
+                if self.differentiates:
+                    assert stamps is not None
+                    U[own] = differentiate(X[own], stamps, window=self.preparation.window)
+                if self.is_relative:
+                    X[own], U[own] = self._relate(
+                        X[own], U[own], stamps, None if reference is None else reference[own]
+                    )
+        if self.is_relative:
+            said = describe(self.columns.relative_to, self.preparation.moving_centre)
+            notes += (Note("relative", self.name, said),)
+            policy = None  # that of the states as they were
         if made:
             N = (
                 from_forces_and_flags(
@@ -391,6 +417,19 @@ class Recording:
         else:
             groups = self.groups(pieces, start)
         return Loaded(Samples(X, U, groups, N), notes)
+
+    def _relate(self, X: Array, U: Array, time: Array | None, reference: Array | None) -> tuple[Array, Array]:
+        """Return states and actions of one episode relative to what the options say."""
+        to, seconds = self.columns.relative_to, self.preparation.moving_centre
+        if reference is not None:
+            assert time is not None
+            X, U = X - reference, U - differentiate(reference, time, window=self.preparation.window)
+        elif to is not None:
+            X = X - end_of(X, str(to))
+        if seconds is not None:
+            assert time is not None
+            X, U = X - moving_centre(X, time, seconds), U - moving_centre(U, time, seconds)
+        return X, U
 
     def _group(self, value: Any, part: int) -> str:
         """Return a name that no other fragment of the source has."""

@@ -7,6 +7,7 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns, Keys
 from unconstrain.recordings.formats.base import ColumnKey, Declared
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.relative import GOAL, START
 from unconstrain.recordings.table import Field, Header
 
 
@@ -16,7 +17,7 @@ class Roles:
 
     Parameters
     ----------
-    state, action, force, policy : tuple of Field
+    state, action, force, policy, reference : tuple of Field
     time, episode, free : Field or None
     projections : tuple of (str, int)
         Columns.
@@ -27,6 +28,7 @@ class Roles:
     action: tuple[Field, ...]
     force: tuple[Field, ...]
     policy: tuple[Field, ...]
+    reference: tuple[Field, ...]
     time: Field | None
     episode: Field | None
     free: Field | None
@@ -88,6 +90,7 @@ def assign_roles(
         action,
         () if force is None else header.find("force", force),
         () if own is None or own.policy is None or not action else header.find("policy", own.policy),
+        _reference(header, columns, len(state), shown),
         None if columns.time is None else header.find_one("time", columns.time),
         None if columns.episode is None else header.find_one("episode", columns.episode),
         None if free is None else header.find_one("free", free),
@@ -98,10 +101,15 @@ def assign_roles(
     if own is not None and own.action_names is not None and action:
         roles = replace(roles, action_names=own.action_names)
     _check_lengths(header, roles, shown)
-    needs_time = ("gap", "max_speed", "min_duration")
+    needs_time = ("gap", "max_speed", "min_duration", "moving_centre")
     untimed = [name for name in needs_time if getattr(preparation, name) is not None]
     if untimed and roles.time is None:
         raise DataError(f"{shown}: {untimed[0]} needs to know the time of each sample; give time= too")
+    if roles.reference and roles.time is None:
+        raise DataError(
+            f"{shown}: columns that states are relative to may move, so the time of each sample is needed; give "
+            "time= too"
+        )
     if preparation.force_threshold is not None:
         if not roles.force:
             raise DataError("force_threshold= is for forces: name their columns with force=")
@@ -112,6 +120,19 @@ def assign_roles(
                 "projections="
             )
     return roles
+
+
+def _reference(header: Header, columns: Columns, n_states: int, shown: str) -> tuple[Field, ...]:
+    keys = columns.relative_to
+    if keys is None or keys in (START, GOAL):
+        return ()
+    found = header.find("relative_to", keys)
+    if len(found) != n_states:
+        raise DataError(
+            f"{shown}: relative_to= takes start, goal, or one column for each of the {n_states} states, and "
+            f"stands for {len(found)} here"
+        )
+    return found
 
 
 def _projection_columns(header: Header, keys: Keys, d: int) -> tuple[ColumnKey, ...]:
@@ -131,7 +152,12 @@ def _projection_columns(header: Header, keys: Keys, d: int) -> tuple[ColumnKey, 
 def _check_lengths(header: Header, roles: Roles, shown: str) -> None:
     n_states = header.length(roles.state[0])
     single = (("time", roles.time), ("episode", roles.episode), ("free", roles.free))
-    several = (("state", roles.state), ("action", roles.action), ("force", roles.force))
+    several = (
+        ("state", roles.state),
+        ("action", roles.action),
+        ("force", roles.force),
+        ("reference", roles.reference),
+    )
     each = [(role, field) for role, fields in several for field in fields]
     each += [(role, field) for role, field in single if field is not None]
     for role, field in each:
@@ -145,6 +171,8 @@ def _check_lengths(header: Header, roles: Roles, shown: str) -> None:
             "time": f"{field.called} has {length} stamps for {n_states} samples; there must be one per sample",
             "episode": f"there are {n_states} states but {length} episode values; there must be one per state",
             "force": f"there are {n_states} states but {length} forces; give one per state",
+            "reference": f"there are {n_states} states but {length} values that they are relative to; give one per "
+            "state",
             "free": f"there are {n_states} states but {length} free flags; give one per state",
         }
         raise DataError(f"{shown}: {words[role]}")

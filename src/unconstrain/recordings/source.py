@@ -274,6 +274,7 @@ def open(
     force: Keys | None = None,
     free: Key | None = None,
     projections: Keys | None = None,
+    relative_to: Keys | None = None,
     time_unit: str | None = None,
     window: float | None = None,
     gap: float | None = None,
@@ -281,6 +282,7 @@ def open(
     min_speed: float | None = None,
     min_duration: float | None = None,
     force_threshold: float | None = None,
+    moving_centre: float | None = None,
     columns: Columns | None = None,
     preparation: Preparation | None = None,
 ) -> Recordings:
@@ -295,10 +297,10 @@ def open(
         ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
         None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
         iterable, which can then be read more than once.
-    state, action, time, episode, force, free, projections : column, or list of columns
+    state, action, time, episode, force, free, projections, relative_to : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
-    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
+    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
@@ -335,7 +337,7 @@ def open(
         Columns,
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
-            "projections": projections,
+            "projections": projections, "relative_to": relative_to,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -344,7 +346,7 @@ def open(
         Preparation,
         {
             "time_unit": time_unit, "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
-            "min_duration": min_duration, "force_threshold": force_threshold,
+            "min_duration": min_duration, "force_threshold": force_threshold, "moving_centre": moving_centre,
         },
     )  # fmt: skip
     if isinstance(source, Recordings):
@@ -388,9 +390,9 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
     ----------
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
         See `open`.
-    state, action, time, episode, force, free, projections : column, or list of columns
+    state, action, time, episode, force, free, projections, relative_to : column, or list of columns
         Which column is what; see `Columns`.
-    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
+    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.

@@ -96,7 +96,9 @@ def fit(
 
         policy = _fit_stream(opened, model, checkpoint, cluster)
         policy.recording_ = recorded.kept()
+        policy.state_names_ = list(opened.names[0])
         policy.save(out, resumable=resumable)
+        recordings.describe_notes(opened.notes, *opened.names)
         reporting.say(describe_fit(policy))
         inferred = describe_inferred(policy)
         if inferred:
@@ -105,7 +107,6 @@ def fit(
             "not compared with ordinary regression, as this was a stream: to compare, fit with `--risk direct` too, "
             "and `unconstrain evaluate` both"
         )
-        recordings.describe_notes(opened.notes)
         _suggest(out)
         return
     recordings.describe(demos)

@@ -95,7 +95,7 @@ def fit(
         from unconstrain.scaling.summary import describe_fit
 
         policy = _fit_stream(opened, model, checkpoint, cluster)
-        policy.recording_ = recorded.kept()
+        policy.recording_ = recorded.kept(opened)
         policy.state_names_ = list(opened.names[0])
         policy.save(out, resumable=resumable)
         recordings.describe_notes(opened.notes, *opened.names)
@@ -112,7 +112,7 @@ def fit(
     recordings.describe(demos)
     comparison = _compare(demos, model, folds)
     policy = comparison.policy
-    policy.recording_ = recorded.kept()
+    policy.recording_ = recorded.kept(opened)
     policy.state_names_ = list(demos.state_names)
     policy.save(out, resumable=resumable)
     if figure is not None:

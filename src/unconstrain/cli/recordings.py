@@ -61,11 +61,11 @@ class Recorded:
         """Read all of it into memory."""
         return self.open().load()
 
-    def kept(self) -> tuple[Columns, Preparation]:
+    def kept(self, opened: "Recordings") -> tuple[Columns, Preparation]:
         """Return how to read other recordings like these, to be saved with a policy."""
         return (
             replace(self.columns, force=None, free=None, projections=None),
-            replace(self.preparation, force_threshold=None),
+            replace(self.preparation, force_threshold=None, action_is=opened.given[1].action_is),
         )
 
     def like(self, kept: tuple[Columns, Preparation] | None) -> "Recorded":
@@ -75,11 +75,13 @@ class Recorded:
         """
         columns, preparation = kept or (Columns(), Preparation())
         # Each of these says how time is known, and takes the place of the others.
-        given = self.given | ({"rate", "time_unit"} if self.given & {"rate", "time_unit", "time"} else set())
+        how_timed = {"rate", "time_unit"}
+        given = self.given | (how_timed if self.given & (how_timed | {"time"}) else set())
+        given |= {"action_is"} if self.given & {"state", "action"} else set()
         return replace(
             self,
-            columns=self.columns if "state" in self.given else self._filled(self.columns, columns),
-            preparation=replace(self, given=given)._filled(self.preparation, preparation),
+            columns=self.columns if "state" in self.given else _filled(self.columns, columns, given),
+            preparation=_filled(self.preparation, preparation, given),
         )
 
     def check_names(self, learnt: "Policy", demos: "Demonstrations") -> None:
@@ -98,14 +100,14 @@ class Recorded:
         if "state" in self.given and sorted(known) != sorted(found):
             return
         raise DataError(
-            f"the policy was learnt from the states {', '.join(known)}, and these recordings have {', '.join(found)} in "
-            f"their place: name the columns in that order with state="
+            f"the policy was learnt from the states {', '.join(known)}, and these recordings have "
+            f"{', '.join(found)} in their place: name the columns in that order with state="
         )
 
-    def _filled(self, own: Carrier, other: Carrier) -> Carrier:
-        """Return options with those of another where the command line does not give them."""
-        taken = {name: getattr(other, name) for name in _names(type(own)) - self.given}
-        return replace(own, **taken)
+
+def _filled(own: Carrier, other: Carrier, given: frozenset[str]) -> Carrier:
+    """Return options with those of another where the command line does not give them."""
+    return replace(own, **{name: getattr(other, name) for name in _names(type(own)) - given})
 
 
 def _recorded(files: tuple[str, ...], **values: Any) -> Recorded:

@@ -51,6 +51,10 @@ class ActionKind:
         return (Note("actions", "", text),)
 
 
+VELOCITY = ActionKind("velocity", False, False)
+"""What actions are unless anything else is found or given."""
+
+
 def find_kind(X: Array, U: Array, episodes: NDArray[np.int64], time: Array | None) -> str:
     """Find what actions are by comparing them with the states and their derivative.
 

@@ -56,7 +56,7 @@ def unwrap(
         result = result.copy() if result is X else result
         result[:, i] = np.unwrap(X[:, i], period=TURNS[turn])
         remedy = "" if chosen is not None else '; if it is no angle, give angle="none"'
-        text = f"the angle {names[i]} wraps {{}} at {turn}, where its turns are counted on{remedy}"
+        text = f"the angle {_plain(names[i])} wraps {{}} at {turn}, where its turns are counted on{remedy}"
         notes.append(Note("angle", file, text, (wraps,), ("time",)))
     if chosen is not None:
         return result, tuple(notes)
@@ -66,11 +66,15 @@ def unwrap(
         result = result.copy() if result is X else result
         result[1:, part] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
         text = (
-            f"the quaternion {', '.join(names[part])} changes its sign {{}}, and is given that of the one before; if it "
-            'is none, give angle="none"'
+            f"the quaternion {_plain(', '.join(names[part]))} changes its sign {{}}, and is given that of the one "
+            'before; if it is none, give angle="none"'
         )
         notes.append(Note("angle", file, text, (int(turned.sum()),), ("time",)))
     return result, tuple(notes)
+
+
+def _plain(name: str) -> str:
+    return name.replace("{}", "{ }")  # which is where a note puts its counts
 
 
 def quaternions(X: Array) -> list[int]:

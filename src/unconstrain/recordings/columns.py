@@ -43,8 +43,8 @@ class Columns:
         The nullspace projection of each sample: one column of lists of d² numbers, row by row, or d² columns. Empty or
         NaN where it is not known.
     angle : column, or list of columns
-        The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default angles,
-        and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
+        The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default
+        angles, and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
 
     Raises
     ------

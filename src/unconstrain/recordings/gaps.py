@@ -59,8 +59,8 @@ def split(
     """Split episodes at steps longer than `gap` or faster than `max_speed`.
 
     The speed of a step is ‖x_{i+1} - x_i‖ / (t_{i+1} - t_i). Fragments of a split episode that are not `long_enough`
-    are dropped; an episode that was not split stays, unless `drop_short`. All is decided episode by episode, so that it does not matter
-    which episodes are split together.
+    are dropped; an episode that was not split stays, unless `drop_short`. All is decided episode by episode, so
+    that it does not matter which episodes are split together.
 
     Parameters
     ----------

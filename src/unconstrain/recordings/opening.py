@@ -9,8 +9,8 @@ from itertools import chain
 from unconstrain import demonstrations_file
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.recordings.batches import FORMS
 from unconstrain.recordings.actions import ActionKind
+from unconstrain.recordings.batches import FORMS
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
 from unconstrain.recordings.formats import lerobot, recognize

@@ -81,7 +81,7 @@ class Preparation:
             object.__setattr__(self, "drop", _listed(self.drop))
         if self.rate is not None and self.time_unit is not None:
             raise DataError(
-                "rate= says that the time column counts frames, and time_unit= that it holds times: leave out one of them"
+                "rate= says that the time column counts frames, and time_unit= that it holds times: leave out one"
             )
         for field in fields(self):
             value = getattr(self, field.name)

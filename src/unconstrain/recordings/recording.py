@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from unconstrain.constraints.recorded import from_forces_and_flags
 from unconstrain.errors import DataError
-from unconstrain.recordings.actions import ActionKind, find_kind, per_second
+from unconstrain.recordings.actions import VELOCITY, ActionKind, find_kind, per_second
 from unconstrain.recordings.angles import unwrap
 from unconstrain.recordings.blocks import (
     Array,
@@ -106,7 +106,7 @@ class Recording:
     preparation: Preparation
     declared: Declared | None = None
     is_along_episodes: bool = False
-    kind: ActionKind = ActionKind("velocity", False, False)
+    kind: ActionKind = VELOCITY
     leader: "Recording | None" = None
 
     @cached_property
@@ -523,8 +523,8 @@ class Recording:
                 U[own] = per_second(U[own], time[own])
         if time is not None and self.preparation.resample is not None and len(X):
             grid = make_grid(time, codes, self.preparation.resample)
-            values = (X, U, forces, policy)
-            X, U, forces, policy = (None if each is None else grid.between(each) for each in values)
+            X, U = grid.between(X), grid.between(U)
+            forces, policy = (None if each is None else grid.between(each) for each in (forces, policy))
             rows = rows[grid.nearest]
             free, N = (None if each is None else each[grid.nearest] for each in (free, N))
             time, codes = grid.time, grid.episodes

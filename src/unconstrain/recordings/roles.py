@@ -10,7 +10,6 @@ from unconstrain.recordings.formats.base import ColumnKey, Declared
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.table import Field, Header
 
-
 UNNAMED = re.compile(r"[xu]\d+(_dot)?")
 """What columns without a header are called."""
 

@@ -313,7 +313,9 @@ def open(
     state, action, time, episode, force, free, projections, angle : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
-    time_unit, rate, action_is, drop, resample, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
+    time_unit, rate, action_is, drop, resample : optional
+        What is done to the samples; see `Preparation`.
+    window, gap, max_speed, min_speed, min_duration, force_threshold : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
@@ -371,7 +373,11 @@ def open(
         return Recordings(open_demonstrations(source, columns, preparation), columns, preparation)
     paths, batches = tell_apart(source)
     if paths:
-        return Recordings(open_files(paths, columns, preparation), columns, preparation)
+        tables = open_files(paths, columns, preparation)
+        found = tables.recordings[0].kind
+        if found.found:  # so that other recordings are read alike
+            preparation = replace(preparation, action_is=found.kind)
+        return Recordings(tables, columns, preparation)
     check_plain(columns, preparation)
     return Recordings(Batches(batches, min_speed=preparation.min_speed), columns, preparation)
 
@@ -406,7 +412,9 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         See `open`.
     state, action, time, episode, force, free, projections, angle : column, or list of columns
         Which column is what; see `Columns`.
-    time_unit, rate, action_is, drop, resample, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
+    time_unit, rate, action_is, drop, resample : optional
+        What is done to the samples; see `Preparation`.
+    window, gap, max_speed, min_speed, min_duration, force_threshold : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.

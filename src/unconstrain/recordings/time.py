@@ -91,16 +91,9 @@ class Clock:
             return cls("frames", text, typical / rate, rate)
         guess, guessed = _guess(float(abs(ticks[0])) if len(ticks) else 0.0, typical)
         found = own or unit or guess
-        counts = (
-            own is unit is None
-            and bool(len(steps))
-            and bool(np.all(steps[steps > 0] == 1.0))
-            and typical == 1
-        )
+        guessed = guessed and own is unit is None
         seconds = TIME_UNITS[found]
-        return cls(
-            found, text, typical / seconds, seconds, own is unit is None and guessed, counts, own is not None
-        )
+        return cls(found, text, typical / seconds, seconds, guessed, guessed and typical == 1.0, own is not None)
 
     def led_by(self, first: "Clock") -> "Clock":
         """Return the clock by which these stamps are read beside those of a first file: in its unit."""
@@ -120,8 +113,8 @@ class Clock:
             )
         elif self.counts:
             text = (
-                f"time goes up by 1, as the numbers of frames do, and milliseconds at 1 kHz: it is read in {self.unit}; "
-                "if that is wrong, give rate= or time_unit="
+                f"time goes up by 1, as the numbers of frames do, and milliseconds at 1 kHz: it is read in "
+                f"{self.unit}; if that is wrong, give rate= or time_unit="
             )
         elif self.guessed:
             text = (
@@ -129,7 +122,8 @@ class Clock:
                 "that is wrong, give time_unit=, or rate= for the numbers of frames"
             )
         elif self.step and not USUAL_STEP[0] <= self.step <= USUAL_STEP[1]:
-            text = f"time read in {self.unit} has a typical step of {self.step:.3g} s; if that is wrong, give time_unit="
+            text = f"time read in {self.unit} has a typical step of {self.step:.3g} s"
+            text += "; if that is wrong, give time_unit="
         else:
             return ()
         return (Note("time", file, text),)

@@ -55,7 +55,7 @@ def test_actions_are_differentiated_where_none_are_given(tmp_path):
     assert demos.state_names == ("x", "y")
     assert demos.action_names == ("x_dot", "y_dot")
     assert demos.episode_labels == ("line",)
-    assert demos.notes == ()
+    assert demos.notes == ("read: 60 samples, 1 episode, 1 file, 50 Hz, 1.18 s, time in s",)
 
 
 def test_action_columns_need_no_time(tmp_path):
@@ -101,7 +101,10 @@ def test_a_decimal_comma_is_told(tmp_path, mark):
     path = written(tmp_path / "a.csv", f"x{mark}u\n1,500{mark}2\n2,250{mark}3\n")
     demos = load(path, state="x", action="u")
     assert demos.states.tolist() == [[1.5], [2.25]]
-    assert demos.notes == ("a.csv: commas in numbers are read as decimal marks",)
+    assert demos.notes == (
+        "a.csv: commas in numbers are read as decimal marks",
+        "read: 2 samples, 1 episode, 1 file, without time",
+    )
     recordings = open_recordings(path, state="x", action="u")
     assert sum(len(block) for block in recordings.blocks(1)) == 2
     assert tuple(map(str, recordings.notes)) == demos.notes
@@ -207,7 +210,9 @@ def test_units_of_time(tmp_path, stamps, unit):
     path = written(tmp_path / "a.csv", rows("t,x", stamps, TIME))
     demos = load(path, state="x", time="t", time_unit=unit)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-6)
-    assert demos.notes == ()
+    guess = "a.csv: time is taken to be in ns, by its typical step of 2e+07"
+    assert [note.split(";")[0] for note in demos.notes[:-1]] == ([guess] if stamps[0] == 0.0 and not unit else [])
+    assert demos.notes[-1].startswith("read: 60 samples, 1 episode, 1 file, 50 Hz, 1.18 s, time in ")
 
 
 def test_nanoseconds_lose_nothing(tmp_path):
@@ -223,8 +228,11 @@ def test_nanoseconds_lose_nothing(tmp_path):
 
 def test_a_doubtful_unit_is_noted(tmp_path):
     path = written(tmp_path / "a.csv", rows("t,x", (TIME * 1e3).astype(int), TIME))
-    (note,) = load(path, state="x", time="t").notes
-    assert note == "a.csv: time read in s has a typical step of 20 s; if that is wrong, give time_unit="
+    note, _ = load(path, state="x", time="t").notes
+    assert note == (
+        "a.csv: time is taken to be in ms, by its typical step of 20; if that is wrong, give time_unit=, or rate= for "
+        "the numbers of frames"
+    )
 
 
 def test_a_gap_splits_and_short_fragments_go(tmp_path):
@@ -237,6 +245,7 @@ def test_a_gap_splits_and_short_fragments_go(tmp_path):
     assert demos.notes == (
         "a.csv: split at 2 gaps longer than 5 typical steps",
         "a.csv: dropped 1 fragment (3 samples) shorter than 0.2 s",
+        "read: 120 samples, 2 episodes, 1 file, 50 Hz, 2.36 s, time in s",
     )
     assert load(path, state="x", time="t", gap=20).n_episodes == 1
     assert load(path, state="x", action="x", time="t").n_episodes == 1
@@ -265,7 +274,10 @@ def test_slow_samples_are_left_out(tmp_path):
     path = written(tmp_path / "a.csv", "x,u\n1,2\n3,0\n4,5\n")
     demos = load(path, state="x", action="u", min_speed=1)
     assert demos.states[:, 0].tolist() == [1.0, 4.0]
-    assert demos.notes == ("left out 1 of 3 samples slower than 1",)
+    assert demos.notes == (
+        "left out 1 of 3 samples slower than 1",
+        "read: 2 samples, 1 episode, 1 file, without time",
+    )
 
 
 @recorded
@@ -275,11 +287,11 @@ def test_the_recorded_circles():
     assert len(demos) == 3060 + 3012
     assert demos.episode_labels == ("planer_circle", "curve_circle")
     assert demos.state_names == ("x", "y", "z")
-    assert len(demos.notes) == 1
+    assert len(demos.notes) == 2
     assert demos.notes[0].startswith("planer_circle.csv: 6 steps more than 30 times faster")
 
     clean = load(files, state=[1, 2, 3], time="rosbagTimestamp", max_speed=1, min_duration=1)
-    assert clean.notes == (
+    assert clean.notes[:-1] == (
         "planer_circle.csv: split at 6 steps faster than 1 per second",
         "planer_circle.csv: dropped 3 fragments (51 samples) shorter than 1 s",
     )

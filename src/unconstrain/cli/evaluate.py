@@ -42,6 +42,7 @@ def evaluate(policy: Path, recorded: recordings.Recorded) -> None:
     with working("reading"):
         demos = recorded.like(getattr(learnt, "recording_", None)).load()
     recordings.describe(demos)
+    recorded.check_names(learnt, demos)
     found = evaluation.evaluate(learnt, demos, SHOWN_EPISODES)
     learnt_from = describe_inferred(learnt)
     if learnt_from:

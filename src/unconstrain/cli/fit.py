@@ -96,8 +96,10 @@ def fit(
         from unconstrain.scaling.summary import describe_fit
 
         policy = _fit_stream(opened, model, checkpoint, cluster)
-        policy.recording_ = recorded.kept()
+        policy.recording_ = recorded.kept(opened)
+        policy.state_names_ = list(opened.names[0])
         policy.save(out, resumable=resumable)
+        recordings.describe_notes(opened.notes, *opened.names)
         reporting.say(describe_fit(policy))
         inferred = describe_inferred(policy)
         if inferred:
@@ -106,13 +108,12 @@ def fit(
             "not compared with ordinary regression, as this was a stream: to compare, fit with `--risk direct` too, "
             "and `unconstrain evaluate` both"
         )
-        recordings.describe_notes(opened.notes)
         _suggest(out)
         return
     recordings.describe(demos)
     comparison = _compare(demos, model, folds)
     policy = comparison.policy
-    policy.recording_ = recorded.kept()
+    policy.recording_ = recorded.kept(opened)
     policy.state_names_ = list(demos.state_names)
     policy.save(out, resumable=resumable)
     if figure is not None:

@@ -1,6 +1,6 @@
 """Which recordings a command reads, and how: options that all commands share."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,10 +11,13 @@ from unconstrain.cli.command import in_words_of_program
 from unconstrain.cli.declared import declared_options, gathered, is_given, option
 from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns
+from unconstrain.recordings.notes import count
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.reading import BEGINS
 
 if TYPE_CHECKING:
     from unconstrain.demonstrations import Demonstrations
+    from unconstrain.policies.base import Policy
     from unconstrain.recordings import Recordings
 
 Carrier = TypeVar("Carrier", Columns, Preparation)
@@ -58,11 +61,11 @@ class Recorded:
         """Read all of it into memory."""
         return self.open().load()
 
-    def kept(self) -> tuple[Columns, Preparation]:
+    def kept(self, opened: "Recordings") -> tuple[Columns, Preparation]:
         """Return how to read other recordings like these, to be saved with a policy."""
         return (
             replace(self.columns, force=None, free=None, projections=None),
-            replace(self.preparation, force_threshold=None),
+            replace(self.preparation, force_threshold=None, action_is=opened.given[1].action_is),
         )
 
     def like(self, kept: tuple[Columns, Preparation] | None) -> "Recorded":
@@ -71,16 +74,40 @@ class Recorded:
         If the command line names the states, it speaks of another layout, and no column is taken over.
         """
         columns, preparation = kept or (Columns(), Preparation())
+        # Each of these says how time is known, and takes the place of the others.
+        how_timed = {"rate", "time_unit"}
+        given = self.given | (how_timed if self.given & (how_timed | {"time"}) else set())
+        given |= {"action_is"} if self.given & {"state", "action"} else set()
         return replace(
             self,
-            columns=self.columns if "state" in self.given else self._filled(self.columns, columns),
-            preparation=self._filled(self.preparation, preparation),
+            columns=self.columns if "state" in self.given else _filled(self.columns, columns, given),
+            preparation=_filled(self.preparation, preparation, given),
         )
 
-    def _filled(self, own: Carrier, other: Carrier) -> Carrier:
-        """Return options with those of another where the command line does not give them."""
-        taken = {name: getattr(other, name) for name in _names(type(own)) - self.given}
-        return replace(own, **taken)
+    def check_names(self, learnt: "Policy", demos: "Demonstrations") -> None:
+        """Refuse recordings whose states are others than those that a policy was learnt from, or in another order.
+
+        Raises
+        ------
+        DataError
+            Names differ that both have. If the command line names the states, only their order may not.
+        """
+        from unconstrain.recordings.roles import is_named
+
+        known, found = tuple(getattr(learnt, "state_names_", ())), demos.state_names
+        if len(known) != len(found) or known == found or not (is_named(known) and is_named(found)):
+            return
+        if "state" in self.given and sorted(known) != sorted(found):
+            return
+        raise DataError(
+            f"the policy was learnt from the states {', '.join(known)}, and these recordings have "
+            f"{', '.join(found)} in their place: name the columns in that order with state="
+        )
+
+
+def _filled(own: Carrier, other: Carrier, given: frozenset[str]) -> Carrier:
+    """Return options with those of another where the command line does not give them."""
+    return replace(own, **{name: getattr(other, name) for name in _names(type(own)) - given})
 
 
 def _recorded(files: tuple[str, ...], **values: Any) -> Recorded:
@@ -119,15 +146,22 @@ folds = option(
 
 
 def describe(demos: "Demonstrations") -> None:
-    """Say what was read: samples, episodes, and what was done to them."""
-    reporting.say(
-        f"read: {len(demos)} samples, {demos.n_episodes} episode{'s' if demos.n_episodes != 1 else ''}, "
-        f"states {', '.join(demos.state_names)}, actions {', '.join(demos.action_names)}"
-    )
-    describe_notes(demos.notes)
+    """Say what was read: samples, episodes, their rate and duration, and what was done to them."""
+    of_demos = f"{BEGINS}{count(len(demos), 'sample')}"
+    if not any(
+        note.startswith(f"{of_demos},") for note in demos.notes
+    ):  # they were saved by Python, for example
+        reporting.say(f"{of_demos}, {count(demos.n_episodes, 'episode')}")
+    describe_notes(demos.notes, demos.state_names, demos.action_names)
 
 
-def describe_notes(notes: Iterable[object]) -> None:
-    """Say what was found while reading."""
-    for note in notes:
-        reporting.say(f"note: {in_words_of_program(str(note))}")
+def describe_notes(notes: Iterable[object], states: Sequence[str], actions: Sequence[str]) -> None:
+    """Say what was read, and what was found then."""
+    sentences = [in_words_of_program(str(note)) for note in notes]
+    for sentence in sentences:
+        if sentence.startswith(BEGINS):
+            reporting.say(sentence)
+    reporting.say(f"states: {', '.join(states)}; actions: {', '.join(actions)}")
+    for sentence in sentences:
+        if not sentence.startswith(BEGINS):
+            reporting.say(f"note: {sentence}")

@@ -14,6 +14,9 @@ Keys = Key | Sequence[Key]
 DIFFERENTIATE = "differentiate"
 """What `action` is where the actions are the derivative of the states."""
 
+NO_ANGLE = "none"
+"""What `angle` is where no column is to be taken for an angle."""
+
 
 @dataclass(frozen=True)
 class Columns:
@@ -39,6 +42,9 @@ class Columns:
     projections : column, or list of columns
         The nullspace projection of each sample: one column of lists of d² numbers, row by row, or d² columns. Empty or
         NaN where it is not known.
+    angle : column, or list of columns
+        The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default
+        angles, and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
 
     relative_to : "start", "goal", or list of columns
         What states are relative to: where each episode starts, or ends; or as many columns as there are states, such as
@@ -59,9 +65,10 @@ class Columns:
     free: Key | None = None
     projections: Keys | None = None
     relative_to: Keys | None = None
+    angle: Keys | None = None
 
     def __post_init__(self) -> None:
-        for name in ("state", "action", "force", "projections", "relative_to"):
+        for name in ("state", "action", "force", "projections", "relative_to", "angle"):
             keys = getattr(self, name)
             if isinstance(keys, str | int | list | tuple | None):
                 continue

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.errors import DataError
+from unconstrain.recordings.steps import comes_in_bursts, typical_step
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,8 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
 
     Recorded stamps jitter, while the filter wants an even grid: the states are then carried to a grid of
     the episode's median step, and the slopes back, by cubic splines. A polynomial of degree ≤ `polyorder`
-    is differentiated exactly (up to rounding) either way.
+    is differentiated exactly (up to rounding) either way. Where stamps come in bursts a spline would swing between
+    them, so the polynomials are fitted to the recorded stamps themselves.
 
     Parameters
     ----------
@@ -67,9 +69,28 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
     step = t[-1] / (size - 1)
     even = size == len(t) and bool(np.all(np.abs(t - grid) <= EVEN * step))
     X = X - X[0]  # so that what rests has a slope of exactly zero
+    if comes_in_bursts(np.diff(t)):
+        return _slopes_of_bursts(X, t, window, polyorder)
     on_grid = X if even else CubicSpline(t, X)(grid)
     slopes = savgol_filter(on_grid, length, polyorder, deriv=1, delta=step, axis=0, mode="interp")
     return slopes if even else CubicSpline(grid, slopes)(t)
+
+
+def _slopes_of_bursts(X: Array, t: Array, window: float, polyorder: int) -> Array:
+    """Return the slope (N, n) at each stamp of a polynomial fitted to the samples within the window around it."""
+    slopes = np.empty_like(X)
+    width = min(window, t[-1])
+    least = min(polyorder + 2, len(t))
+    for i, now in enumerate(t):
+        begin = min(max(now - width / 2, 0.0), t[-1] - width)
+        first, last = np.searchsorted(t, begin, "left"), np.searchsorted(t, begin + width, "right")
+        # One burst alone tells no slope.
+        while (last - first < least or t[last - 1] - t[first] < width / 2) and (first > 0 or last < len(t)):
+            first, last = max(first - 1, 0), min(last + 1, len(t))
+        own = slice(first, last)
+        powers = np.vander((t[own] - now) / width, min(polyorder, last - first - 1) + 1, increasing=True)
+        slopes[i] = np.linalg.lstsq(powers, X[own], rcond=None)[0][1] / width
+    return slopes
 
 
 def window_samples(step: float, window: float, polyorder: int = 2) -> int:
@@ -86,8 +107,8 @@ def spans_window(time: Array, window: float, polyorder: int = 2) -> bool:
 
 
 def _step(time: Array) -> float:
-    # The median, because gaps stretch the mean; but bursts of stamps must not make an endless grid.
-    return max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / (10 * (len(time) - 1)))
+    # Not the mean, which gaps stretch; and what is left of bursts must not make an endless grid.
+    return max(typical_step(np.diff(time)), float(time[-1] - time[0]) / (10 * (len(time) - 1)))
 
 
 def _grid_size(time: Array) -> int:

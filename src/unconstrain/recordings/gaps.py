@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.recordings.steps import typical_step
+
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
@@ -52,12 +54,13 @@ def split(
     gap: float | None,
     max_speed: float | None,
     long_enough: Callable[[Array], bool],
+    drop_short: bool = False,
 ) -> Fragments:
     """Split episodes at steps longer than `gap` or faster than `max_speed`.
 
     The speed of a step is ‖x_{i+1} - x_i‖ / (t_{i+1} - t_i). Fragments of a split episode that are not `long_enough`
-    are dropped; an episode that was not split stays. All is decided episode by episode, so that it does not matter
-    which episodes are split together.
+    are dropped; an episode that was not split stays, unless `drop_short`. All is decided episode by episode, so
+    that it does not matter which episodes are split together.
 
     Parameters
     ----------
@@ -67,11 +70,13 @@ def split(
     episodes : ndarray of shape (N,)
         Numbers from 0, each used; episodes may be interleaved.
     gap : float or None
-        Seconds; None for five times an episode's median step.
+        Seconds; None for five times an episode's typical step.
     max_speed : float or None
         [units of the states] / s.
     long_enough : function
         Of the stamps of a fragment.
+    drop_short : bool
+        Whether whole episodes that are not `long_enough` are dropped too.
 
     Returns
     -------
@@ -88,7 +93,7 @@ def split(
     if gap is None:
         for code, one in enumerate(own):
             if one.stop - one.start > 1:
-                longest[code] = GAP_STEPS * np.median(steps[one.start : one.stop - 1])
+                longest[code] = GAP_STEPS * typical_step(steps[one.start : one.stop - 1])
     gaps = within & (steps > longest[e[1:]])
     fast = within & ~gaps & (speeds > (np.inf if max_speed is None else max_speed))
     unbroken = within & ~gaps & ~fast
@@ -100,7 +105,7 @@ def split(
     dropped = suspicious = 0
     for code, one in enumerate(own):
         parts = [slice(one.start + part.start, one.start + part.stop) for part in _runs(fragment[one])]
-        good = [part for part in parts if len(parts) == 1 or long_enough(t[part])]
+        good = [part for part in parts if (len(parts) == 1 and not drop_short) or long_enough(t[part])]
         dropped += len(parts) - len(good)
         for number, part in enumerate(good, start=1):
             kept[part], codes[part] = True, len(origins)

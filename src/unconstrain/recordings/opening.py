@@ -9,8 +9,9 @@ from itertools import chain
 from unconstrain import demonstrations_file
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
+from unconstrain.recordings.actions import ActionKind
 from unconstrain.recordings.batches import FORMS
-from unconstrain.recordings.columns import Columns
+from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
 from unconstrain.recordings.formats import lerobot, recognize
 from unconstrain.recordings.formats.base import Declared, Format
@@ -141,7 +142,38 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     )
     tables = Tables(recordings)
     tables.check_alike()
-    return tables
+    first = recordings[0]
+    recordings = (first, *(replace(each, leader=first) for each in recordings[1:]))
+    return Tables(_with_kind(recordings, preparation.action_is))
+
+
+def _with_kind(recordings: tuple[Recording, ...], given: str | None) -> tuple[Recording, ...]:
+    """Decide what the actions are, once for all: by the first recording where it is not given."""
+    first = recordings[0]
+    if first.differentiates or first.saves:
+        if given not in (None, "velocity"):
+            raise DataError(
+                f"action_is={given} is about recorded actions, and there are none in {first.shown}: name their columns "
+                "with action=, or leave it out"
+            )
+        return recordings
+    kind = ActionKind(given or first.find_kind(), given is None, first.timed)
+    if kind.kind == "velocity":
+        return recordings
+    if given is not None and not kind.timed:
+        raise DataError(
+            f"{first.shown}: action_is={given} needs to know the time of each sample; give time= or rate= too"
+        )
+    if kind.kind == "increment" or not kind.timed:
+        return tuple(replace(each, kind=kind) for each in recordings)
+    every = []
+    for each in recordings:
+        names = tuple(f"{name}_dot" for name in each.roles.state_names)
+        roles = replace(each.roles, action=(), policy=(), action_names=names)
+        every.append(
+            replace(each, kind=kind, roles=roles, columns=replace(each.columns, action=DIFFERENTIATE))
+        )
+    return tuple(every)
 
 
 def _open_file(about: tuple[File, bool]) -> Format:
@@ -190,12 +222,12 @@ def _recording(
                 f"{shown} holds {count} samples where its meta/info.json says {robot.n_samples}; "
                 "download the dataset again, or give its Parquet files themselves"
             )
-        columns = robot.assign(columns)
+        columns = _by_rate(columns, robot.assign(columns), preparation)
     header = filled[0].columns()
     declared = filled[0].declared() if columns.state is None else None
     own = columns
     if declared is not None:
-        own = _with_declared(columns, declared)
+        own = _by_rate(columns, _with_declared(columns, declared), preparation)
     elif columns.state is None and columns != Columns():
         raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
     try:
@@ -213,6 +245,11 @@ def _recording(
             action_names=_robot_names(robot, roles.action or roles.state, roles.action_names),
         )
     return Recording(shown, name, stem, number, alone, tuple(filled), roles, own, preparation, declared)
+
+
+def _by_rate(given: Columns, found: Columns, preparation: Preparation) -> Columns:
+    """Leave out the time that a file has of its own where a rate is given instead."""
+    return replace(found, time=given.time) if preparation.rate is not None else found
 
 
 def _with_declared(columns: Columns, declared: Declared) -> Columns:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from unconstrain.arrays import NOT_IDEMPOTENT, not_idempotent
 from unconstrain.errors import DataError
 from unconstrain.recordings.formats.base import ColumnKey, Format
-from unconstrain.recordings.table import Cells, Field, describe_kind, row
+from unconstrain.recordings.table import Cells, Field, describe_kind, is_text, row
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,10 @@ class Piece(NamedTuple):
     rows : pyarrow.RecordBatch
     at : mapping of (str, int) to int
         Where in `rows` each column is.
+    kept : ndarray of shape (N,), optional
+        Which rows these are, counted from `first`, where some were left out.
+    whole : int, optional
+        How many rows there were before.
     """
 
     format: Format
@@ -40,10 +44,48 @@ class Piece(NamedTuple):
     first: int
     rows: Any
     at: Mapping[ColumnKey, int]
+    kept: NDArray[np.int64] | None = None
+    whole: int | None = None
+
+    @property
+    def length(self) -> int:
+        """The number of rows, with those that were left out."""
+        return len(self.rows) if self.whole is None else self.whole
 
     def slice(self, start: int, length: int) -> "Piece":
         """Return some of the rows."""
         return self._replace(first=self.first + start, rows=self.rows.slice(start, length))
+
+    def place(self, index: int) -> str:
+        """Say where in the file a row is."""
+        return self.format.place(self.first + (index if self.kept is None else int(self.kept[index])))
+
+    def without(self, rows: NDArray[np.bool_]) -> "Piece":
+        """Return the piece without the rows of a mask (N,)."""
+        return self._replace(
+            rows=self.rows.filter(pa.array(~rows)), kept=np.flatnonzero(~rows), whole=len(rows)
+        )
+
+    def missing(self, field: Field, role: str) -> NDArray[np.bool_]:
+        """Tell in which rows (N,) a field is empty or no finite number; of times, only where it is empty."""
+        values = self.column(field.key)
+        if field.component is not None:
+            return self._missing_component(values, field.width, field.component)
+        if pa.types.is_temporal(values.type):
+            return values.is_null().to_numpy(zero_copy_only=False)
+        cells = self.cells(field, role)
+        if role == "time" and is_text(values.type):
+            return pc.equal(pc.fill_null(pc.utf8_trim_whitespace(values), ""), "").to_numpy(
+                zero_copy_only=False
+            )
+        return ~np.isfinite(cells.numbers_or_nan())
+
+    def _missing_component(self, values: Any, width: int, component: int) -> NDArray[np.bool_]:
+        lengths = pc.fill_null(pc.list_value_length(values), 0).to_numpy(zero_copy_only=False)
+        missing = lengths != width
+        flat = values.filter(pa.array(~missing)).flatten().to_numpy(zero_copy_only=False)
+        missing[~missing] = ~np.isfinite(flat.astype(np.float64).reshape(-1, width)[:, component])
+        return missing
 
     def column(self, key: ColumnKey) -> Any:
         """Return a column as an Arrow array."""
@@ -55,7 +97,7 @@ class Piece(NamedTuple):
             self.column(field.key),
             self.format.file.shown,
             field.called,
-            lambda i: self.format.place(self.first + i),
+            self.place,
         )
         if field.component is None:
             return cells
@@ -157,15 +199,15 @@ def read_projections(
     for piece in pieces:
         N = _read_sparse(piece, columns, d**2)
         bad = ~np.isfinite(N).all(axis=1) & ~np.isnan(N).all(axis=1)
-        shown, place = piece.format.file.shown, piece.format.place
+        shown = piece.format.file.shown
         if bad.any():
             raise DataError(
-                f"{shown}: the projection at {place(piece.first + int(np.argmax(bad)))} is neither finite numbers "
+                f"{shown}: the projection at {piece.place(int(np.argmax(bad)))} is neither finite numbers "
                 "throughout nor NaN throughout: correct it, or make all of it NaN"
             )
         N = N.reshape(-1, d, d)
         if check and len(odd := not_idempotent(N)):
-            raise DataError(f"{shown}: the projection at {place(piece.first + int(odd[0]))} {NOT_IDEMPOTENT}")
+            raise DataError(f"{shown}: the projection at {piece.place(int(odd[0]))} {NOT_IDEMPOTENT}")
         parts.append(N)
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -177,7 +219,7 @@ def places(pieces: Sequence[Piece]) -> Callable[[int], str]:
     def place(index: int) -> str:
         which = int(np.searchsorted(bounds, index, side="right")) - 1
         piece = pieces[which]
-        at = piece.format.place(piece.first + index - int(bounds[which]))
+        at = piece.place(index - int(bounds[which]))
         return f"{at} of {piece.format.file.shown}" if piece.file != pieces[0].file else at
 
     return place
@@ -239,7 +281,7 @@ def _read_sparse(piece: Piece, columns: Sequence[ColumnKey], width: int) -> Arra
                     f"{row(piece.first + int(odd[0]))} where {width} numbers are needed"
                 )
             rows, values = lengths > 0, values.flatten()
-        cells = Cells(values, shown, f"column {name!r}", lambda i: piece.format.place(piece.first + i))
+        cells = Cells(values, shown, f"column {name!r}", piece.place)
         plain = cells.numbers_or_nan()
         if len(columns) == 1:
             numbers[rows] = plain.reshape(-1, width)

@@ -1,6 +1,7 @@
 """What is done to a recording before it is learnt from."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from numbers import Real
 
@@ -8,6 +9,15 @@ from unconstrain.errors import DataError
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Ticks a second."""
+
+DROPPED = ("missing", "duplicates", "short", "pauses")
+"""What `drop` may leave out."""
+
+ACTION_KINDS = ("velocity", "target", "increment")
+"""What recorded actions may be."""
+
+CHOICES = {"time_unit": tuple(TIME_UNITS), "action_is": ACTION_KINDS}
+"""Options that take one of some words."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +28,18 @@ class Preparation:
     ----------
     time_unit : {"s", "ms", "us", "ns"}, optional
         The unit of numbers in the time column. By default it is guessed, and the guess is noted.
+    rate : float, optional
+        Samples a second. Without a time column the time of a row is its number within the episode / `rate`; with one,
+        the column counts frames, of which there are `rate` a second.
+    action_is : {"velocity", "target", "increment"}, optional
+        What recorded actions are: velocities, commanded states (the states are differentiated instead), or steps
+        (divided by the time that passes). By default it is found by comparing them with the states, and noted.
+    drop : str, or list of str, optional
+        What is left out and counted, separated by commas: missing (rows without a state, an action or a stamp),
+        duplicates (rows with the stamp of the row before), short (episodes too short to be used), pauses (stretches at
+        rest).
+    resample : float, optional
+        Samples a second to which episodes are brought by linear interpolation, never across gaps.
     window : float
         Seconds over which states are smoothed when they are differentiated.
     gap : float, optional
@@ -43,6 +65,10 @@ class Preparation:
     """
 
     time_unit: str | None = None
+    rate: float | None = None
+    action_is: str | None = None
+    drop: str | Sequence[str] | None = None
+    resample: float | None = None
     window: float = 0.2
     gap: float | None = None
     max_speed: float | None = None
@@ -52,20 +78,45 @@ class Preparation:
     moving_centre: float | None = None
 
     def __post_init__(self) -> None:
-        unit = self.time_unit
-        if unit is not None and not (isinstance(unit, str) and unit in TIME_UNITS):
+        for name, words in CHOICES.items():
+            word = getattr(self, name)
+            if word is not None and not (isinstance(word, str) and word in words):
+                raise DataError(f"{name} must be one of {', '.join(words)}, got {_shown(word)}")
+        if self.drop is not None:
+            object.__setattr__(self, "drop", _listed(self.drop))
+        if self.rate is not None and self.time_unit is not None:
             raise DataError(
-                f"time_unit must be one of {', '.join(TIME_UNITS)}, got {' '.join(repr(unit).split()):.60}"
+                "rate= says that the time column counts frames, and time_unit= that it holds times: leave out one"
             )
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name == "time_unit" or value is None:
+            if field.name in (*CHOICES, "drop") or value is None:
                 continue
             try:
                 number = float(value)
             except (TypeError, ValueError, OverflowError):
                 number = math.nan
             if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
-                raise DataError(
-                    f"{field.name} must be a positive number, got {' '.join(repr(value).split()):.60}"
-                )
+                raise DataError(f"{field.name} must be a positive number, got {_shown(value)}")
+
+    def drops(self, what: str) -> bool:
+        """Whether one of `DROPPED` is left out."""
+        return isinstance(self.drop, str) and what in self.drop.split(",")
+
+
+def _listed(drop: object) -> str | None:
+    """Write what is to be dropped in one way, so that equal preparations compare equal."""
+    each = drop.split(",") if isinstance(drop, str) else drop
+    words = (
+        [word.strip() if isinstance(word, str) else word for word in each]
+        if isinstance(each, Sequence)
+        else [drop]
+    )
+    odd = [word for word in words if word not in DROPPED]
+    if odd:
+        raise DataError(f"drop takes {', '.join(DROPPED)}, separated by commas, got {_shown(odd[0])}")
+    return ",".join(word for word in DROPPED if word in words) or None
+
+
+def _shown(value: object) -> str:
+    return f"{' '.join(repr(value).split()):.60}"

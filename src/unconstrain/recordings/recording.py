@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from unconstrain.constraints.recorded import from_forces_and_flags
 from unconstrain.errors import DataError
+from unconstrain.recordings.actions import VELOCITY, ActionKind, find_kind, per_second
+from unconstrain.recordings.angles import unwrap
 from unconstrain.recordings.blocks import (
     Array,
     Block,
@@ -19,13 +21,15 @@ from unconstrain.recordings.blocks import (
     Motion,
     leave_out_slow,
     number_values,
+    select,
 )
-from unconstrain.recordings.columns import Columns
+from unconstrain.recordings.columns import NO_ANGLE, Columns
 from unconstrain.recordings.derivative import differentiate, spans_window
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared, Format
 from unconstrain.recordings.gaps import GAP_STEPS, SUSPICIOUS, Fragments, split
 from unconstrain.recordings.notes import Note
+from unconstrain.recordings.pauses import AT_REST, SHORTEST, find_pauses
 from unconstrain.recordings.pieces import (
     Piece,
     places,
@@ -35,10 +39,13 @@ from unconstrain.recordings.pieces import (
     read_projections,
 )
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.reading import tally
 from unconstrain.recordings.relative import describe, end_of, moving_centre
+from unconstrain.recordings.resampling import make_grid
 from unconstrain.recordings.roles import Roles
+from unconstrain.recordings.steps import comes_in_bursts, runs
 from unconstrain.recordings.table import Field
-from unconstrain.recordings.time import Clock
+from unconstrain.recordings.time import Clock, repeated
 from unconstrain.samples import Samples
 
 Codes = NDArray[np.int64]
@@ -83,6 +90,10 @@ class Recording:
         What the files say of themselves.
     is_along_episodes : bool
         Whether blocks end where episodes do even if samples are taken by themselves.
+    kind : ActionKind
+        What recorded actions are.
+    leader : Recording, optional
+        The recording whose unit of time is taken where it has to be guessed.
     """
 
     shown: str
@@ -96,6 +107,8 @@ class Recording:
     preparation: Preparation
     declared: Declared | None = None
     is_along_episodes: bool = False
+    kind: ActionKind = VELOCITY
+    leader: "Recording | None" = None
 
     @cached_property
     def n_rows(self) -> int:
@@ -109,8 +122,24 @@ class Recording:
 
     @property
     def splits(self) -> bool:
-        """Whether episodes may be split."""
-        return self.differentiates or not (self.preparation.gap is self.preparation.max_speed is None)
+        """Whether samples are prepared by their time: split, resampled, differentiated, or left out by it."""
+        if not self.timed:
+            return False
+        how = self.preparation
+        asked = not (how.gap is how.max_speed is how.resample is None)
+        by_time = any(how.drops(what) for what in ("duplicates", "short", "pauses"))
+        return self.differentiates or asked or by_time or self.kind.kind == "increment"
+
+    @property
+    def timed(self) -> bool:
+        """Whether the time of samples is known."""
+        return self.roles.time is not None or self.preparation.rate is not None
+
+    @property
+    def unwraps(self) -> bool:
+        """Whether states are looked through for angles."""
+        chosen = self.columns.angle
+        return chosen != NO_ANGLE and (self.differentiates or chosen is not None)
 
     @property
     def is_relative(self) -> bool:
@@ -148,6 +177,8 @@ class Recording:
             return "differentiate" if self.differentiates else "split"
         if self.is_relative:
             return "find what is relative in"
+        if self.unwraps or self.preparation.drop is not None:
+            return "unwrap" if self.unwraps else "drop samples of"
         return "filter the forces of" if self.makes_projections and self.roles.force else None
 
     def read_pieces(
@@ -170,14 +201,51 @@ class Recording:
                 )
             begin += n_rows
 
+    @property
+    def saves(self) -> bool:
+        """Whether the files hold what this package saved: actions are velocities there."""
+        return self._saved
+
+    def find_kind(self) -> str:
+        """Find what the recorded actions are, by the first rows."""
+        if len(self.roles.state) != len(self.roles.action) or self.roles.state == self.roles.action:
+            return "velocity"
+        time = () if self.roles.time is None else (self.roles.time,)
+        episode = () if self.roles.episode is None else (self.roles.episode,)
+        pieces: list[Piece] = []
+        for piece in self.read_pieces(_distinct(self.roles.state, self.roles.action, time, episode)):
+            pieces.append(piece.slice(0, CLOCKED))
+            if sum(len(each.rows) for each in pieces) >= CLOCKED:
+                break
+        pieces = [piece for piece in self._complete(pieces) if len(piece.rows)]
+        if not pieces:
+            return "velocity"
+        n = len(self.roles.state)
+        both = read_numbers(pieces, (*self.roles.state, *self.roles.action), "state and action").astype(
+            np.float64
+        )
+        codes = number_values(self.labels(pieces))[0]
+        order = np.argsort(codes, kind="stable")
+        seconds = None
+        if self.roles.time is not None:
+            ticks = np.concatenate(
+                [self.clock.ticks(piece.cells(self.roles.time, "time")) for piece in pieces]
+            )
+            seconds = (ticks - ticks[0])[order] / self.clock.ticks_a_second
+        elif self.timed:
+            seconds = self._counted(codes)[order]
+        return find_kind(both[:n].T[order], both[n:].T[order], codes[order], seconds)
+
     def read_plain(self, pieces: Sequence[Piece]) -> tuple[NDArray[Any], NDArray[Any] | None]:
         """Return the states (N, n) and actions (N, d) of pieces as they lie in the files, or None for actions."""
         roles = self.roles
+        pieces = self._complete(pieces)
         if self.differentiates:
             return read_numbers(pieces, roles.state, "state").T, None
         both = read_numbers(pieces, (*roles.state, *roles.action), "state and action")
         n = len(roles.state)
-        return both[:n].T, both[n:].T
+        U = both[n:].T
+        return both[:n].T, U / self.step if self.kind.kind == "increment" and self.timed else U
 
     def plain_keys(self) -> list[ColumnKey]:
         """Return the columns of states and actions."""
@@ -202,8 +270,7 @@ class Recording:
         Block
         """
         pieces = self.read_pieces(self._keys(everything), start, stop)
-        timed = everything and self.roles.time is not None and not self._saved
-        whole = self.whole_episodes_for or ("time" if timed else None)
+        whole = self._whole_for(everything)
         load = partial(self._load, everything=everything)
         if batch_rows is None or (whole and all(file.at_once for file in self.files)):
             every = list(pieces)
@@ -216,6 +283,13 @@ class Recording:
             yield from self._whole_episodes(pieces, start, batch_rows, None, load)
         else:
             yield from _blocks_of_rows(pieces, start, batch_rows, load)
+
+    @cached_property
+    def step(self) -> float:
+        """The typical step (s) between samples, as they lie in the files; 0.0 where it is not known."""
+        if self.roles.time is not None:
+            return self.clock.step
+        return 0.0 if self.preparation.rate is None else 1.0 / self.preparation.rate
 
     def labels(self, pieces: Sequence[Piece]) -> NDArray[Any]:
         """Return what is not torn apart in blocks of whole episodes, (N,): the values of the episode column."""
@@ -270,9 +344,15 @@ class Recording:
         keys = _distinct((self.roles.time,), () if self.roles.episode is None else (self.roles.episode,))
         piece = next(piece for piece in self.read_pieces(keys) if len(piece.rows))
         piece = piece.slice(0, CLOCKED) if not piece.format.at_once else piece
+        if self.preparation.drops("missing"):
+            piece = piece.without(piece.missing(self.roles.time, "time"))
         codes, _ = number_values(self.labels([piece]))
         unit = "s" if self._saved else self.preparation.time_unit
-        return Clock.decide(piece.cells(self.roles.time, "time"), codes, unit)
+        cells = piece.cells(self.roles.time, "time")
+        own = Clock.decide(cells, codes, unit, self.preparation.rate)
+        if unit is not None or self.leader is None or own.of_type:
+            return own
+        return own.led_by(self.leader.clock)
 
     @property
     def _saved(self) -> bool:
@@ -315,15 +395,63 @@ class Recording:
         guesses: set[bytes] = {
             metadata[GUESS] for piece in pieces if GUESS in (metadata := piece.rows.schema.metadata or {})
         }
-        notes = (Note("guess", self.name, guess.decode()) for guess in sorted(guesses))
+        notes = [Note("guess", self.name, guess.decode()) for guess in sorted(guesses)]
+        if not prepares and self.roles.time is not None:
+            notes += self.clock.note(self.name)
         loaded = replace(loaded, notes=(*notes, *loaded.notes))
         least = self.preparation.min_speed
         if least is not None:
-            return leave_out_slow(loaded, least)
-        if not everything:
-            return loaded
-        U = loaded.samples.actions
-        return replace(loaded, motion=Motion(len(U), bool(np.any(U)), 0.0))
+            loaded = leave_out_slow(loaded, least)
+        elif everything:
+            U = loaded.samples.actions
+            loaded = replace(loaded, motion=Motion(len(U), bool(np.any(U)), 0.0))
+        return replace(loaded, notes=(*loaded.notes, self._tally(loaded, pieces, start)))
+
+    def _tally(self, loaded: Loaded, pieces: Sequence[Piece], start: int) -> Note:
+        """Count samples and episodes of a block."""
+        groups, time = loaded.samples.groups, loaded.time
+        assert groups is not None
+        if self._whole_for(bool(loaded.episodes)) is None:
+            values = self.labels(pieces)
+            begins = int(np.sum(values[1:] != values[:-1])) + self._begins(values[:1], start)
+            return tally(self.name, len(groups), begins, None)
+        codes, found = number_values(groups)
+        if self._undivided and not loaded.episodes:
+            codes, found = np.zeros_like(codes), found[:1]
+        if time is None:
+            return tally(self.name, len(groups), len(found), None)
+        lasted = sum(float(time[own[-1]] - time[own[0]]) for own in runs(codes))
+        return tally(self.name, len(groups), len(found), lasted)
+
+    def _whole_for(self, everything: bool) -> str | None:
+        """Return why blocks hold whole episodes, where they do."""
+        timed = everything and self.timed and not self._saved
+        return self.whole_episodes_for or ("time" if timed else None)
+
+    def _begins(self, first: NDArray[Any], start: int) -> int:
+        """Return 1 if the row `start`, of this label (1,), is the first of its episode; 0 otherwise."""
+        if not start:
+            return 1
+        field = self.roles.episode or self.roles.state[0]
+        before = list(self.read_pieces([field.key], start - 1, start))
+        return int(self.labels(before)[0] != first[0])
+
+    def _complete(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
+        """Leave out the rows without a state, an action or a stamp, where that is asked for."""
+        if not self.preparation.drops("missing"):
+            return pieces
+        roles = self.roles
+        several = (("state", roles.state), ("action", roles.action))
+        wanted = [(role, field) for role, fields in several for field in fields]
+        complete = []
+        for piece in pieces:
+            missing = np.zeros(len(piece.rows), dtype=bool)
+            timed = roles.time is not None and roles.time.key in piece.at
+            for role, field in [*wanted, *([("time", roles.time)] if timed else [])]:
+                assert field is not None
+                missing |= piece.missing(field, role)
+            complete.append(piece.without(missing) if missing.any() else piece)
+        return complete
 
     def _take(self, pieces: Sequence[Piece], start: int) -> Samples:
         """Return samples that do not depend on their neighbours."""
@@ -342,6 +470,10 @@ class Recording:
     def _prepare(self, pieces: Sequence[Piece], start: int, everything: bool) -> Loaded:
         """Return samples split into fragments, timed, differentiated, and with their projections."""
         roles = self.roles
+        count = sum(len(piece.rows) for piece in pieces)
+        raw = number_values(self.labels(pieces))[0] if roles.time is None and self.timed else None
+        pieces = self._complete(pieces)
+        rows = _kept(pieces)
         X = np.ascontiguousarray(read_numbers(pieces, roles.state, "state").T, dtype=np.float64)
         U = np.zeros_like(X)
         if roles.action:
@@ -352,6 +484,11 @@ class Recording:
             forces = np.ascontiguousarray(read_numbers(pieces, roles.force, "force").T, dtype=np.float64)
         if roles.free is not None and (everything or made):
             free = read_flags(pieces, roles.free)
+        reference = None
+        if roles.reference:
+            reference = np.ascontiguousarray(
+                read_numbers(pieces, roles.reference, "relative_to").T, dtype=np.float64
+            )
         if roles.policy and everything:
             policy = np.ascontiguousarray(read_numbers(pieces, roles.policy, "policy").T, dtype=np.float64)
         if self.reads_projections:
@@ -360,38 +497,69 @@ class Recording:
         episodes = self._label(self.labels(pieces))
         codes, origins = episodes.codes, [(code, 0) for code in range(len(episodes.labels))]
         notes: tuple[Note, ...] = ()
-        rows = np.arange(len(X))
-        reference = None
-        if roles.reference:
-            reference = np.ascontiguousarray(
-                read_numbers(pieces, roles.reference, "relative_to").T, dtype=np.float64
+        if len(rows) < count:
+            notes = (
+                Note(
+                    "empty", self.name, "left out {} with something missing", (count - len(rows),), ("row",)
+                ),
             )
-        if roles.time is not None and (everything or self.splits or self.is_relative):
-            time = self._seconds(pieces, codes)
-            notes = () if self._saved else self.clock.note(self.name)
-            if self.splits or not self._saved:
-                found = self._split(X, time, episodes)
-                notes += self._notes(found)
-                rows, codes, origins = found.samples, found.episodes, list(found.origins)
-                X, U, time = X[rows], U[rows], time[rows]
-                forces, free, policy, N, reference = (
-                    None if a is None else a[rows] for a in (forces, free, policy, N, reference)
-                )
-        if len(X) and (self.differentiates or self.is_relative):
-            order = np.argsort(codes, kind="stable")
-            for own in np.split(order, np.cumsum(np.bincount(codes))[:-1]):
-                stamps = None if time is None else time[own]
-                if self.differentiates:
-                    assert stamps is not None
-                    U[own] = differentiate(X[own], stamps, window=self.preparation.window)
-                if self.is_relative:
-                    X[own], U[own] = self._relate(
-                        X[own], U[own], stamps, None if reference is None else reference[own]
-                    )
+
+        def take(chosen: Codes) -> None:
+            nonlocal rows, X, U, time, forces, free, policy, N, reference
+            rows, X, U = rows[chosen], X[chosen], U[chosen]
+            time, forces, free, policy, N, reference = (
+                None if each is None else each[chosen] for each in (time, forces, free, policy, N, reference)
+            )
+
+        if self.timed and (everything or self.splits or self.is_relative) and len(X):
+            seconds, again = self._seconds(pieces, codes) if raw is None else (self._counted(raw)[rows], None)
+            if again is not None and again.any():
+                text = "left out {} with the stamp of the one before"
+                notes += (Note("repeated", self.name, text, (int(again.sum()),), ("row",)),)
+                codes = codes[~again]
+                take(np.flatnonzero(~again))
+            time = seconds
+            if roles.time is not None and not self._saved:
+                notes += self.clock.note(self.name)
+        if self.unwraps and len(X):
+            found, turned = self._unwrap(X, codes)
+            X, notes = found, (*notes, *turned)
+        if time is not None and (self.splits or not self._saved):
+            episodes = _Episodes(codes, episodes.values, episodes.labels)
+            if not self._saved:
+                notes += self._bursts(time, codes)
+            fragments = self._split(X, time, episodes)
+            notes += self._notes(fragments)
+            codes, origins = fragments.episodes, list(fragments.origins)
+            take(fragments.samples)
+        if time is not None and self.kind.kind == "increment":
+            for own in runs(codes):
+                U[own] = per_second(U[own], time[own])
+        if time is not None and self.preparation.resample is not None and len(X):
+            grid = make_grid(time, codes, self.preparation.resample)
+            X, U = grid.between(X), grid.between(U)
+            forces, policy, reference = (
+                None if each is None else grid.between(each) for each in (forces, policy, reference)
+            )
+            rows = rows[grid.nearest]
+            free, N = (None if each is None else each[grid.nearest] for each in (free, N))
+            time, codes = grid.time, grid.episodes
+        if self.differentiates and len(X):
+            assert time is not None
+            for own in runs(codes):
+                U[own] = differentiate(X[own], time[own], window=self.preparation.window)
         if self.is_relative:
+            for own in runs(codes):
+                stamps = None if time is None else time[own]
+                apart = None if reference is None else reference[own]
+                X[own], U[own] = self._relate(X[own], U[own], stamps, apart)
             said = describe(self.columns.relative_to, self.preparation.moving_centre)
             notes += (Note("relative", self.name, said),)
             policy = None  # that of the states as they were
+        resting = np.zeros(len(X), dtype=bool)
+        if time is not None and not self._saved:
+            resting, paused = self._pauses(U, time, codes)
+            notes += paused
         if made:
             N = (
                 from_forces_and_flags(
@@ -407,16 +575,66 @@ class Recording:
             )
             for code, part in origins
         )
+        groups: NDArray[Any]
         if everything:
-            return Loaded(Samples(X, U, codes, N), notes, None, kept, time, policy, forces, free)
-        if self._undivided and len(kept) == 1:
-            groups: NDArray[Any] = (start + rows) * BLOCKS // self.n_rows
+            groups = codes
+        elif self._undivided and len(kept) == 1:
+            groups = (start + rows) * BLOCKS // self.n_rows
         elif self.splits:
             names = [self._group(episodes.values[code], part) for code, part in origins]
             groups = np.array(names, dtype=np.str_)[codes]
         else:
             groups = self.groups(pieces, start)
-        return Loaded(Samples(X, U, groups, N), notes)
+        loaded = Loaded(Samples(X, U, groups, N), notes, None, kept if everything else (), time)
+        if everything:
+            loaded = replace(loaded, policy=policy, forces=forces, free=free)
+        return select(loaded, ~resting) if self.preparation.drops("pauses") and resting.any() else loaded
+
+    def _unwrap(self, X: Array, codes: Codes) -> tuple[Array, tuple[Note, ...]]:
+        """Return the states with angles unwrapped, and what was found."""
+        notes: tuple[Note, ...] = ()
+        result = X
+        for own in runs(codes):
+            unwrapped, found = unwrap(X[own], self.roles.state_names, self.roles.angle, self.name)
+            if found:
+                result = result.copy() if result is X else result
+                result[own] = unwrapped
+                notes += found
+        return result, notes
+
+    def _bursts(self, time: Array, codes: Codes) -> tuple[Note, ...]:
+        """Note episodes whose stamps come in bursts."""
+        count = sum(comes_in_bursts(np.diff(time[own])) for own in runs(codes))
+        text = (
+            "the stamps of {} come in bursts, as when messages are stamped where they arrive; name better stamps with "
+            "time= if there are any, or give resample= to spread these evenly"
+        )
+        return (Note("burst", self.name, text, (count,), ("episode",)),) if count else ()
+
+    def _pauses(self, U: Array, time: Array, codes: Codes) -> tuple[NDArray[np.bool_], tuple[Note, ...]]:
+        """Find the samples (N,) in pauses, and note how many they are."""
+        resting = np.zeros(len(U), dtype=bool)
+        count = 0
+        for own in runs(codes):
+            resting[own], number = find_pauses(U[own], time[own])
+            count += number
+        if not count:
+            return resting, ()
+        what = f"in {{}} of {SHORTEST:g} s or more below {AT_REST:.0%} of the usual speed"
+        if self.preparation.drops("pauses"):
+            text = f"left out {{}} of {{}} {what}"
+        else:
+            text = f'{{}} of {{}} are at rest, {what}; drop="pauses" leaves them out, or min_speed= slow ones'
+        counts = (int(resting.sum()), len(U), count)
+        return resting, (Note("pause", self.name, text, counts, ("sample", "", "pause")),)
+
+    def _counted(self, codes: Codes) -> Array:
+        """Return the time (s) of rows without stamps, (N,): their number within the episode by the rate."""
+        assert self.preparation.rate is not None
+        time = np.empty(len(codes))
+        for own in runs(codes):
+            time[own] = np.arange(len(own)) / self.preparation.rate
+        return time
 
     def _relate(self, X: Array, U: Array, time: Array | None, reference: Array | None) -> tuple[Array, Array]:
         """Return states and actions of one episode relative to what the options say."""
@@ -465,40 +683,57 @@ class Recording:
             codes, found, labels if self.alone else [f"{self.label}:{label}" for label in labels]
         )
 
-    def _seconds(self, pieces: Sequence[Piece], codes: Codes) -> Array:
+    def _seconds(self, pieces: Sequence[Piece], codes: Codes) -> tuple[Array, NDArray[np.bool_] | None]:
+        """Return the time (s), and where stamps that are repeated are to be left out, which rows (N,) these are."""
         field = self.roles.time
         assert field is not None
         stamps = [piece.alike(field, "time") for piece in pieces]
         if self._saved and not self.splits:
-            return np.concatenate([part.numbers() for part in stamps])
+            return np.concatenate([part.numbers() for part in stamps]), None
         ticks = np.concatenate([self.clock.ticks(part) for part in stamps])
-        return self.clock.seconds(ticks, codes, stamps[0].path, field.called, places(pieces))
+        where = places(pieces)
+        again = None
+        if self.preparation.drops("duplicates"):
+            again = repeated(ticks, codes)
+            left = np.flatnonzero(~again)
+            ticks, codes = ticks[left], codes[left]
+            return self.clock.seconds(
+                ticks, codes, stamps[0].path, field.called, lambda i: where(int(left[i]))
+            ), again
+        return self.clock.seconds(ticks, codes, stamps[0].path, field.called, where), None
 
     def _split(self, X: Array, time: Array, episodes: _Episodes) -> Fragments:
         how = self.preparation
-        if self.differentiates:
+        if (self.differentiates or self.kind.kind == "increment") and not how.drops("short"):
             self._check_long_enough(time, episodes)
         gap = how.gap
         if gap is None and not self.differentiates:
-            gap = math.inf  # given actions do not depend on their neighbours, so a gap does no harm
+            gap = (
+                None if how.resample is not None else math.inf
+            )  # given actions do not depend on their neighbours, so a gap does no harm
 
         def long_enough(stamps: Array) -> bool:
             # Rounding must not drop a fragment of exactly the duration asked for.
             lasts = stamps[-1] - stamps[0] >= (how.min_duration or 0.0) * (1 - 1e-9)
-            return bool(lasts) and (not self.differentiates or spans_window(stamps, how.window))
+            if not lasts or (len(stamps) < 2 and self.kind.kind == "increment"):
+                return False
+            return not self.differentiates or spans_window(stamps, how.window)
 
-        return split(X, time, episodes.codes, gap=gap, max_speed=how.max_speed, long_enough=long_enough)
+        return split(
+            X, time, episodes.codes, gap=gap, max_speed=how.max_speed, long_enough=long_enough,
+            drop_short=how.drops("short"),
+        )  # fmt: skip
 
     def _check_long_enough(self, time: Array, episodes: _Episodes) -> None:
         window = self.preparation.window
         order = np.argsort(episodes.codes, kind="stable")
         bounds = np.cumsum(np.bincount(episodes.codes))[:-1]
         for label, stamps in zip(episodes.labels, np.split(time[order], bounds), strict=True):
-            if not spans_window(stamps, window):
+            if len(stamps) < 2 or (self.differentiates and not spans_window(stamps, window)):
                 samples = f"{len(stamps)} sample{'' if len(stamps) == 1 else 's'}"
                 raise DataError(
                     f"{self.shown}: episode {label!r} has {samples} over {stamps[-1] - stamps[0]:.3g} s, too few to "
-                    f"differentiate with window={window:g} s; leave it out, or lower window="
+                    f'differentiate with window={window:g} s; leave it out with drop="short", or lower window='
                 )
 
     def _notes(self, found: Fragments) -> tuple[Note, ...]:
@@ -583,6 +818,15 @@ def _blocks_of_rows(
             count += len(piece.rows)
     if waiting:
         yield Block(start, start + count, partial(load, waiting, start))
+
+
+def _kept(pieces: Sequence[Piece]) -> Codes:
+    """Return the numbers of the rows of pieces, counted from the first, where some may have been left out."""
+    at, every = 0, []
+    for piece in pieces:
+        every.append(at + (np.arange(len(piece.rows)) if piece.kept is None else piece.kept))
+        at += piece.length
+    return np.concatenate(every)
 
 
 def _describe_label(value: Any) -> str:

@@ -1,14 +1,18 @@
 """Which fields of a recording play which role."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.columns import Columns, Keys
+from unconstrain.recordings.columns import NO_ANGLE, Columns, Keys
 from unconstrain.recordings.formats.base import ColumnKey, Declared
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.relative import GOAL, START
 from unconstrain.recordings.table import Field, Header
+
+UNNAMED = re.compile(r"[xu]\d+(_dot)?")
+"""What columns without a header are called."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,8 @@ class Roles:
     projections : tuple of (str, int)
         Columns.
     state_names, action_names : tuple of str
+    angle : tuple of int or None
+        Which of the states are angles; None where that is to be found.
     """
 
     state: tuple[Field, ...]
@@ -35,6 +41,7 @@ class Roles:
     projections: tuple[ColumnKey, ...]
     state_names: tuple[str, ...]
     action_names: tuple[str, ...]
+    angle: tuple[int, ...] | None = None
 
     @property
     def n_actions(self) -> int:
@@ -70,9 +77,10 @@ def assign_roles(
     """
     if columns.state is None:
         raise DataError(f"{shown}: give state=, the columns that are states; {header.listing()}")
-    if columns.differentiated and columns.time is None:
+    if columns.differentiated and columns.time is None and preparation.rate is None:
         raise DataError(
-            f"{shown}: give action=, or time= so that the states can be differentiated; {header.listing()}"
+            f"{shown}: give action=, or time= so that the states can be differentiated, or rate= where no column holds "
+            f"time; {header.listing()}"
         )
     state = header.find("state", columns.state)
     action: tuple[Field, ...] = ()
@@ -101,14 +109,14 @@ def assign_roles(
     if own is not None and own.action_names is not None and action:
         roles = replace(roles, action_names=own.action_names)
     _check_lengths(header, roles, shown)
-    needs_time = ("gap", "max_speed", "min_duration", "moving_centre")
+    roles = replace(roles, angle=_angles(header, columns.angle, roles, shown))
+    needs_time = ("gap", "max_speed", "min_duration", "resample", "moving_centre")
     untimed = [name for name in needs_time if getattr(preparation, name) is not None]
-    if untimed and roles.time is None:
-        raise DataError(f"{shown}: {untimed[0]} needs to know the time of each sample; give time= too")
-    if roles.reference and roles.time is None:
+    untimed += [f'drop="{what}"' for what in ("duplicates", "pauses") if preparation.drops(what)]
+    untimed += ["relative_to"] if roles.reference else []  # such columns may move
+    if untimed and roles.time is None and preparation.rate is None:
         raise DataError(
-            f"{shown}: columns that states are relative to may move, so the time of each sample is needed; give "
-            "time= too"
+            f"{shown}: {untimed[0]} needs to know the time of each sample; give time= or rate= too"
         )
     if preparation.force_threshold is not None:
         if not roles.force:
@@ -133,6 +141,18 @@ def _reference(header: Header, columns: Columns, n_states: int, shown: str) -> t
             f"stands for {len(found)} here"
         )
     return found
+
+
+def _angles(header: Header, keys: Keys | None, roles: Roles, shown: str) -> tuple[int, ...] | None:
+    if keys is None:
+        return None
+    if keys == NO_ANGLE:
+        return ()
+    found = header.find("angle", keys)
+    foreign = [field.called for field in found if field not in roles.state]
+    if foreign:
+        raise DataError(f"{shown}: angle= names states, and {foreign[0]} is none; name it with state= too")
+    return tuple(roles.state.index(field) for field in found)
 
 
 def _projection_columns(header: Header, keys: Keys, d: int) -> tuple[ColumnKey, ...]:
@@ -182,6 +202,11 @@ def _check_lengths(header: Header, roles: Roles, shown: str) -> None:
             raise DataError(
                 f"{shown}: there are {n_states} states but {length} projections; give one per state"
             )
+
+
+def is_named(names: Sequence[str]) -> bool:
+    """Whether a file has names for its columns, other than those they get where it has none."""
+    return not all(map(UNNAMED.fullmatch, names))
 
 
 def _names(header: Header, fields: Sequence[Field], letter: str) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """The one gateway to recordings: `open` finds out what there is, and what it returns reads it."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
@@ -17,6 +17,7 @@ from unconstrain.recordings.columns import Columns, Key, Keys
 from unconstrain.recordings.notes import Note, add_up, combine
 from unconstrain.recordings.opening import check_plain, open_demonstrations, open_files, tell_apart
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.reading import without_tallies
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.tables import Tables
 from unconstrain.samples import Samples
@@ -74,6 +75,14 @@ class Recordings:
             return given
         units = {each.clock.unit for each in self.source.recordings if each.roles.time is not None}
         return replace(given, time_unit=units.pop()) if len(units) == 1 else given
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The names of states and actions; none where the source is arrays."""
+        if not isinstance(self.source, Tables):
+            return (), ()
+        first = self.source.recordings[0].roles
+        return first.state_names, first.action_names
 
     @property
     def n_rows(self) -> int | None:
@@ -140,7 +149,7 @@ class Recordings:
             notes = combine((*notes, *loaded.notes))
             if len(loaded):
                 some = True
-                yield self._assemble([loaded], labels, add_up(loaded.notes))
+                yield self._assemble([loaded], labels, without_tallies(add_up(loaded.notes)))
             elif not some:
                 empty.append(replace(loaded, notes=()))
         self.notes = self.findings(notes)
@@ -183,7 +192,8 @@ class Recordings:
             One for each finding in each file.
         """
         own = self.source.notes() if isinstance(self.source, Tables) else ()
-        return add_up((*own, *notes))
+        found = add_up((*own, *notes))
+        return self.source.summarize(found) if isinstance(self.source, Tables) else found
 
     @property
     def _alone(self) -> bool:
@@ -275,7 +285,12 @@ def open(
     free: Key | None = None,
     projections: Keys | None = None,
     relative_to: Keys | None = None,
+    angle: Keys | None = None,
     time_unit: str | None = None,
+    rate: float | None = None,
+    action_is: str | None = None,
+    drop: str | Sequence[str] | None = None,
+    resample: float | None = None,
     window: float | None = None,
     gap: float | None = None,
     max_speed: float | None = None,
@@ -297,10 +312,12 @@ def open(
         ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
         None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
         iterable, which can then be read more than once.
-    state, action, time, episode, force, free, projections, relative_to : column, or list of columns
+    state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
-    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
+    time_unit, rate, action_is, drop, resample : optional
+        What is done to the samples; see `Preparation`.
+    window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
@@ -337,7 +354,7 @@ def open(
         Columns,
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
-            "projections": projections, "relative_to": relative_to,
+            "projections": projections, "relative_to": relative_to, "angle": angle,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -345,8 +362,10 @@ def open(
         preparation,
         Preparation,
         {
-            "time_unit": time_unit, "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
-            "min_duration": min_duration, "force_threshold": force_threshold, "moving_centre": moving_centre,
+            "time_unit": time_unit, "rate": rate, "action_is": action_is, "drop": drop, "resample": resample,
+            "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
+            "min_duration": min_duration, "force_threshold": force_threshold,
+            "moving_centre": moving_centre,
         },
     )  # fmt: skip
     if isinstance(source, Recordings):
@@ -357,7 +376,11 @@ def open(
         return Recordings(open_demonstrations(source, columns, preparation), columns, preparation)
     paths, batches = tell_apart(source)
     if paths:
-        return Recordings(open_files(paths, columns, preparation), columns, preparation)
+        tables = open_files(paths, columns, preparation)
+        found = tables.recordings[0].kind
+        if found.found:  # so that other recordings are read alike
+            preparation = replace(preparation, action_is=found.kind)
+        return Recordings(tables, columns, preparation)
     check_plain(columns, preparation)
     return Recordings(Batches(batches, min_speed=preparation.min_speed), columns, preparation)
 
@@ -390,9 +413,11 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
     ----------
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
         See `open`.
-    state, action, time, episode, force, free, projections, relative_to : column, or list of columns
+    state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
         Which column is what; see `Columns`.
-    time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
+    time_unit, rate, action_is, drop, resample : optional
+        What is done to the samples; see `Preparation`.
+    window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.

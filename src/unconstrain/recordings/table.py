@@ -225,7 +225,7 @@ class Cells:
         if len(bad):
             raise DataError(
                 f"{self.path}: {self.called} holds {array[bad[0]]} at {self.place(int(bad[0]))}"
-                f"{_others(len(bad))}; fill it in or take the sample out"
+                f'{_others(len(bad))}; fill it in, or leave such samples out with drop="missing"'
             )
         return array
 
@@ -318,7 +318,7 @@ class Cells:
             first = pc.index(missing, True).as_py()
             raise DataError(
                 f"{self.path}: {self.called} is empty at {self.place(first)}"
-                f"{_others(count)}; fill it in or take the sample out"
+                f'{_others(count)}; fill it in, or leave such samples out with drop="missing"'
             )
         return values
 

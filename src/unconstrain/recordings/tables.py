@@ -1,7 +1,6 @@
 """Recordings that lie in files, one after the other, as one source of samples."""
 
-import re
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -14,15 +13,14 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.blocks import Block, Loaded, Motion
 from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.pieces import Piece
+from unconstrain.recordings.reading import BEGINS, KIND, summarize, without_tallies
 from unconstrain.recordings.recording import Recording
+from unconstrain.recordings.roles import is_named
 
 HEAD_ROWS = 2
 
 SAMPLED_GROUPS = 16
 """Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
-
-UNNAMED = re.compile(r"[xu]\d+(_dot)?")
-"""What columns without a header are called."""
 
 OPTIONAL = ("time", "policy", "projections", "forces", "free")
 """What demonstrations may have, in the order in which notes speak of them."""
@@ -72,14 +70,18 @@ class Tables:
     @property
     def relabels(self) -> bool:
         """Whether it is known only after preparation which episodes there are."""
-        return any(each.splits or each.preparation.min_speed is not None for each in self.recordings)
+        return any(
+            each.splits or each.preparation.min_speed is not None or each.preparation.drop is not None
+            for each in self.recordings
+        )
 
     def head(self) -> tuple[NDArray[Any], NDArray[Any] | None]:
         """Read a few states (N, n) and actions (N, d); None for actions that are yet to be differentiated."""
         first = self.recordings[0]
         pieces = first.read_pieces(first.plain_keys())
         piece = next(piece for piece in pieces if len(piece.rows))
-        return first.read_plain([piece.slice(0, HEAD_ROWS)])
+        X, U = first.read_plain([piece.slice(0, HEAD_ROWS) if first.preparation.drop is None else piece])
+        return X[:HEAD_ROWS], None if U is None else U[:HEAD_ROWS]
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any] | None]:
         """Read random rows, in order; all where there are no more. Of many row groups only some are read."""
@@ -180,7 +182,7 @@ class Tables:
                     raise DataError(
                         f"{one.shown} has {len(first)} {what} columns but {other.shown} has {len(names)}"
                     )
-            named = [(names, each) for names, each in every if _is_named(names)]
+            named = [(names, each) for names, each in every if is_named(names)]
             for names, other in named[1:]:
                 first, one = named[0]
                 if names != first:
@@ -199,11 +201,34 @@ class Tables:
         """What of `OPTIONAL` all recordings have."""
         return frozenset.intersection(*(_present(each) for each in self.recordings))
 
+    @property
+    def as_saved(self) -> bool:
+        """Whether all are demonstrations that are given back as they were saved, with what was noted of them then."""
+        return all(each.saves and each.whole_episodes_for is None for each in self.recordings)
+
+    def summarize(self, notes: Iterable[Note]) -> tuple[Note, ...]:
+        """Replace the counts of samples and episodes among notes by one sentence on all that was read."""
+        notes = tuple(notes)
+        if self.as_saved:
+            return without_tallies(notes)
+        timed = [each for each in self.recordings if each.timed]
+        if not any(note.kind == KIND and len(note.counts) > 2 for note in notes):
+            timed = timed[:1]  # others were not looked at
+        resampled = timed[0].preparation.resample if timed else None
+        rates = [resampled] if resampled else [1.0 / each.step for each in timed if each.step]
+        stamped = [each for each in timed if each.roles.time is not None and not each.saves]
+        units = ["by row / rate" if not stamped else f"in {each.clock.unit}" for each in stamped or timed[:1]]
+        if timed and timed[0].saves:
+            units = ["in s"]
+        files = sum(file.file.filesystem is not None for each in self.recordings for file in each.files)
+        return summarize(notes, files, rates, units)
+
     def notes(self) -> tuple[Note, ...]:
         """Return the notes that need no sample to be read: what files said, and what some of them do not have."""
         declared = [each.declared for each in self.recordings if each.declared is not None]
         said = dict.fromkeys(note for each in declared for note in each.notes)
-        notes = [Note("saved", "", note) for note in said]
+        notes = [Note("saved", "", note) for note in said if self.as_saved or not note.startswith(BEGINS)]
+        notes += self.recordings[0].kind.note()
         for what in OPTIONAL:
             missing = sum(what not in _present(each) for each in self.recordings)
             if 0 < missing < len(self.recordings):
@@ -266,15 +291,10 @@ def _joined(
 def _present(recording: Recording) -> frozenset[str]:
     roles = recording.roles
     there = {
-        "time": roles.time is not None,
+        "time": recording.timed,
         "policy": bool(roles.policy),
         "projections": bool(roles.projections) or recording.makes_projections,
         "forces": bool(roles.force),
         "free": roles.free is not None,
     }
     return frozenset(what for what, is_there in there.items() if is_there)
-
-
-def _is_named(names: Sequence[str]) -> bool:
-    """Whether a file has names for its columns, other than those it gets where it has none."""
-    return not all(map(UNNAMED.fullmatch, names))

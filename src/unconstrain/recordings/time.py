@@ -1,7 +1,7 @@
 """Time stamps as they are written, made seconds since the start of each episode."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,19 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.preparation import TIME_UNITS
+from unconstrain.recordings.steps import typical_step
 from unconstrain.recordings.table import Cells, is_text
 
 Codes = NDArray[np.int64]
 
-# No one records a second apart in units of 10 µs: a typical step this large is counted in nanoseconds.
-NANOSECOND_STEP = 1e5
+# By the size of numbers that count from 1970: seconds of 1986 to 2128, and thousands of them.
+EPOCH = (5e8, 5e9)
+
+# A clock by which samples are further apart (s) does not count from 1970 in the unit at hand.
+EPOCH_STEP = 10.0
+
+# From these typical steps on a clock counts milliseconds, microseconds, nanoseconds: 2 Hz to 2 kHz in each.
+LEAST_STEPS = {"ms": 2.0, "us": 500.0, "ns": 5e5}
 
 # Outside of these a typical step (seconds) makes the unit doubtful, which is noted.
 USUAL_STEP = (1e-4, 1.0)
@@ -34,18 +41,33 @@ class Clock:
         What stamps that are text are read as.
     step : float
         The typical step (s) of those first samples, zero where there is none.
+    ticks_a_second : float
+        By which stamps are divided.
+    guessed : bool
+        Whether the unit is a guess of which the user should hear.
+    counts : bool
+        Whether stamps go up by exactly 1, so that they may be the numbers of frames.
+    of_type : bool
+        Whether stamps carry their unit.
+    instead_of : str
+        The unit that a file by itself would be taken to be in, where it is read in that of the first file.
     """
 
     unit: str
     text: pa.DataType | None
     step: float
+    ticks_a_second: float
+    guessed: bool = False
+    counts: bool = False
+    of_type: bool = False
+    instead_of: str = ""
 
     @classmethod
-    def decide(cls, stamps: Cells, episodes: Codes, unit: str | None) -> "Clock":
+    def decide(cls, stamps: Cells, episodes: Codes, unit: str | None, rate: float | None = None) -> "Clock":
         """Decide by the first stamps of a recording.
 
-        Without a `unit`, stamps whose typical step is 100000 or more are nanoseconds, others seconds. Stamps that
-        carry their unit (timestamps, durations) go by that.
+        Stamps that carry their unit (timestamps, durations) go by that. Without a `unit`, numbers that count from 1970
+        tell it by their size; those of other numbers by their typical step.
 
         Parameters
         ----------
@@ -53,6 +75,8 @@ class Clock:
         episodes : ndarray of shape (N,)
             The episode of each stamp, as a number from 0.
         unit : {"s", "ms", "us", "ns"}, optional
+        rate : float, optional
+            Where stamps count frames, of which there are so many a second.
 
         Returns
         -------
@@ -62,15 +86,48 @@ class Clock:
         ticks, own = _ticks(stamps, text)
         order = np.argsort(episodes, kind="stable")
         steps = np.diff(ticks[order])[np.diff(episodes[order]) == 0]
-        typical = float(np.median(steps)) if len(steps) else 0.0
-        unit = own or unit or ("ns" if typical >= NANOSECOND_STEP else "s")
-        return cls(unit, text, typical / TIME_UNITS[unit])
+        typical = typical_step(steps)
+        if rate is not None and own is None:
+            return cls("frames", text, typical / rate, rate)
+        guess, guessed = _guess(float(abs(ticks[0])) if len(ticks) else 0.0, typical)
+        found = own or unit or guess
+        guessed = guessed and own is unit is None
+        seconds = TIME_UNITS[found]
+        return cls(
+            found, text, typical / seconds, seconds, guessed, guessed and typical == 1.0, own is not None
+        )
+
+    def led_by(self, first: "Clock") -> "Clock":
+        """Return the clock by which these stamps are read beside those of a first file: in its unit."""
+        if first.unit == self.unit or first.of_type or "frames" in (first.unit, self.unit):
+            return self
+        step = self.step * self.ticks_a_second / first.ticks_a_second
+        return replace(
+            self, unit=first.unit, step=step, ticks_a_second=first.ticks_a_second, instead_of=self.unit
+        )
 
     def note(self, file: str) -> tuple[Note, ...]:
-        """Note a unit that is doubtful."""
-        if not self.step or USUAL_STEP[0] <= self.step <= USUAL_STEP[1]:
+        """Note a unit that is guessed or doubtful."""
+        if self.instead_of:
+            text = (
+                f"time is read in {self.unit} as in the first file, though by itself it would be taken to be in "
+                f"{self.instead_of}; if that is wrong, give time_unit="
+            )
+        elif self.counts:
+            text = (
+                f"time goes up by 1, as the numbers of frames do, and milliseconds at 1 kHz: it is read in "
+                f"{self.unit}; if that is wrong, give rate= or time_unit="
+            )
+        elif self.guessed:
+            text = (
+                f"time is taken to be in {self.unit}, by its typical step of {self.step * self.ticks_a_second:.4g}; if "
+                "that is wrong, give time_unit=, or rate= for the numbers of frames"
+            )
+        elif self.step and not USUAL_STEP[0] <= self.step <= USUAL_STEP[1]:
+            text = f"time read in {self.unit} has a typical step of {self.step:.3g} s"
+            text += "; if that is wrong, give time_unit="
+        else:
             return ()
-        text = f"time read in {self.unit} has a typical step of {self.step:.3g} s; if that is wrong, give time_unit="
         return (Note("time", file, text),)
 
     def ticks(self, stamps: Cells) -> NDArray[Any]:
@@ -118,12 +175,33 @@ class Clock:
             does = "repeats a stamp" if steps[first] == 0 else "goes back"
             raise DataError(
                 f"{path}: time in {called} {does} at {place(int(order[first + 1]))}; "
-                "it must increase strictly within an episode, so take such samples out, "
-                "or give episode=, the column that tells episodes apart"
+                "it must increase strictly within an episode, so "
+                + ('give drop="duplicates"' if steps[first] == 0 else "sort the samples")
+                + ", or give episode=, the column that tells episodes apart"
             )
         starts = np.zeros(int(episodes.max()) + 1, dtype=ticks.dtype)
         starts[episodes[order[::-1]]] = ticks[order[::-1]]  # the last one written is an episode's first
-        return (ticks - starts[episodes]) / TIME_UNITS[self.unit]
+        return (ticks - starts[episodes]) / self.ticks_a_second
+
+
+def repeated(ticks: NDArray[Any], episodes: Codes) -> NDArray[np.bool_]:
+    """Tell which stamps (N,) equal the one before them in the same episode."""
+    order = np.argsort(episodes, kind="stable")
+    again = np.zeros(len(ticks), dtype=bool)
+    again[order[1:]] = (np.diff(episodes[order]) == 0) & (np.diff(ticks[order]) == 0)
+    return again
+
+
+def _guess(first: float, step: float) -> tuple[str, bool]:
+    """Guess the unit by the size of the first stamp and the typical step, and say whether it is worth a note."""
+    for unit, ticks in TIME_UNITS.items():
+        if EPOCH[0] * ticks <= first < EPOCH[1] * ticks and step <= EPOCH_STEP * ticks:
+            return unit, False
+    found = "s"
+    for unit, least in LEAST_STEPS.items():
+        if step >= least:
+            found = unit
+    return found, found != "s" or step >= 1.0
 
 
 def _type_of_text(stamps: Cells) -> pa.DataType | None:

@@ -47,6 +47,8 @@ class LeRobot:
         names, shape = about.get("names"), about.get("shape")
         if isinstance(names, dict):  # {"motors": [...]}, {"axes": [...]}
             names = [name for group in names.values() if isinstance(group, list) for name in group]
+        if isinstance(names, list) and len(names) == 1 and isinstance(names[0], list):
+            names = names[0]
         fits = isinstance(names, list) and isinstance(shape, list) and shape == [len(names)]
         return [str(name) for name in names] if fits and isinstance(names, list) else []
 

@@ -1,0 +1,121 @@
+"""States that come back to where they were: angles that wrap, and quaternions that change their sign."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.recordings.notes import Note
+
+Array = NDArray[np.float64]
+
+TURNS = {"2π": 2 * np.pi, "360": 360.0}
+"""A turn, in the units that angles are recorded in."""
+
+# How far beyond half a turn or a whole one recorded angles may lie, as a share of a turn.
+MARGIN = 0.01
+
+# A wrap is a step of a turn and some motion: at most this share of a turn, and at most twice the motion between others,
+# unless that is nothing beside a turn.
+LEFT = 0.25
+REST = 1e-3
+
+# How far the norm of a recorded quaternion may be from 1.
+UNIT = 0.02
+
+
+def unwrap(
+    X: Array, names: Sequence[str], chosen: Sequence[int] | None, file: str
+) -> tuple[Array, tuple[Note, ...]]:
+    """Count the turns of angles on, and give quaternions the sign of the one before, in one episode.
+
+    Parameters
+    ----------
+    X : ndarray of shape (N, n)
+        The states of the episode.
+    names : sequence of str
+        Of the states.
+    chosen : sequence of int or None
+        Which states are angles; None to recognise angles and quaternions by their jumps.
+    file : str
+        The file, as notes call it.
+
+    Returns
+    -------
+    ndarray of shape (N, n)
+        `X` itself where nothing jumps.
+    tuple of Note
+    """
+    notes: list[Note] = []
+    result = X
+    for i in range(X.shape[1]) if chosen is None else chosen:
+        found = _turn(X[:, i], chosen is not None)
+        if found is None:
+            continue
+        turn, wraps = found
+        result = result.copy() if result is X else result
+        result[:, i] = np.unwrap(X[:, i], period=TURNS[turn])
+        remedy = "" if chosen is not None else '; if it is no angle, give angle="none"'
+        text = f"the angle {_plain(names[i])} wraps {{}} at {turn}, where its turns are counted on{remedy}"
+        notes.append(Note("angle", file, text, (wraps,), ("time",)))
+    if chosen is not None:
+        return result, tuple(notes)
+    for first in quaternions(X):
+        part = slice(first, first + 4)
+        turned = np.sum(X[1:, part] * X[:-1, part], axis=1) < 0
+        result = result.copy() if result is X else result
+        result[1:, part] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
+        text = (
+            f"the quaternion {_plain(', '.join(names[part]))} changes its sign {{}}, and is given that of the one "
+            'before; if it is none, give angle="none"'
+        )
+        notes.append(Note("angle", file, text, (int(turned.sum()),), ("time",)))
+    return result, tuple(notes)
+
+
+def _plain(name: str) -> str:
+    return name.replace("{}", "{ }")  # which is where a note puts its counts
+
+
+def quaternions(X: Array) -> list[int]:
+    """Find four neighbouring states of unit norm that change their sign from one sample to the next.
+
+    Returns
+    -------
+    list of int
+        The first state of each.
+    """
+    found: list[int] = []
+    squares = X**2
+    for i in range(X.shape[1] - 3):
+        if found and i < found[-1] + 4:
+            continue
+        norms = np.sqrt(squares[:, i : i + 4].sum(axis=1))
+        if len(X) < 2 or np.any(np.abs(norms - 1.0) > UNIT):
+            continue
+        if np.any(np.sum(X[1:, i : i + 4] * X[:-1, i : i + 4], axis=1) < -0.5):
+            found.append(i)
+    return found
+
+
+def _turn(x: Array, certain: bool) -> tuple[str, int] | None:
+    """Return at what x (N,) wraps and how often, or None where it does not.
+
+    Unless it is `certain` that it is an angle, all of it has to lie within one turn, and each jump to lead from one end
+    of that turn to the other.
+    """
+    if len(x) < 2:
+        return None
+    steps = np.abs(np.diff(x))
+    low, high = float(x.min()), float(x.max())
+    for name, turn in TURNS.items():
+        jumps = steps > turn / 2
+        if not jumps.any():
+            return None  # none of 360 either
+        margin = MARGIN * turn
+        within = any(low >= start - margin and high <= start + turn + margin for start in (-turn / 2, 0.0))
+        usual = max(2.0 * float(steps[~jumps].max(initial=0.0)), REST * turn)
+        across = np.abs(steps[jumps] - turn) <= min(LEFT * turn, usual)
+        if within and (certain or across.all()):
+            return name, int(jumps.sum())
+    return None

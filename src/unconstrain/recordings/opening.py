@@ -190,16 +190,19 @@ def _recording(
             )
         columns = robot.assign(columns)
     header = filled[0].columns()
-    declared = filled[0].declared() if columns.state is None else None
+    declared = _declared(filled[0], columns)
     own = columns
     if declared is not None:
         own = _with_declared(columns, declared)
-    elif columns.state is None and columns != Columns():
+        if not declared.saved:  # its notes are on what it takes for time
+            notes = declared.notes if columns.time is None else ()
+            declared = replace(declared, notes=tuple(f"{name}: {note}" for note in notes))
+    if columns.state is None and columns != Columns() and (declared is None or not declared.saved):
         raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
     try:
         roles = assign_roles(header, own, declared, preparation, shown)
     except DataError as error:
-        if declared is None or columns != Columns():
+        if declared is None or not declared.saved or columns != Columns():
             raise
         raise DataError(
             f"{shown} is damaged and cannot be read as saved demonstrations ({error!s:.300})"
@@ -213,11 +216,22 @@ def _recording(
     return Recording(shown, name, stem, number, alone, tuple(filled), roles, own, preparation, declared)
 
 
+def _declared(file: Format, columns: Columns) -> Declared | None:
+    """Return what a file says of its columns, where that still matters beside what the user says."""
+    try:
+        declared = file.declared()
+    except DataError:
+        if columns.state is None:
+            raise
+        return None
+    return declared if declared is None or columns.state is None or declared.columns.state is None else None
+
+
 def _with_declared(columns: Columns, declared: Declared) -> Columns:
     own = declared.columns
     return replace(
         columns,
-        state=own.state,
+        state=columns.state if own.state is None else own.state,
         action=own.action if columns.action is None else columns.action,
         time=own.time if columns.time is None else columns.time,
         episode=own.episode if columns.episode is None else columns.episode,

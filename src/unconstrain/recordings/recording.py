@@ -304,7 +304,10 @@ class Recording:
         prepares = everything or self.whole_episodes_for is not None
         loaded = self._prepare(pieces, start, everything) if prepares else Loaded(self._take(pieces, start))
         guesses: set[bytes] = {
-            metadata[GUESS] for piece in pieces if GUESS in (metadata := piece.rows.schema.metadata or {})
+            guess
+            for piece in pieces
+            if GUESS in (metadata := piece.rows.schema.metadata or {})
+            for guess in metadata[GUESS].splitlines()
         }
         notes = (Note("guess", self.name, guess.decode()) for guess in sorted(guesses))
         loaded = replace(loaded, notes=(*notes, *loaded.notes))

@@ -15,6 +15,7 @@ from unconstrain.recordings.files import File, Folder, label, locate, short_name
 from unconstrain.recordings.formats import lerobot, recognize
 from unconstrain.recordings.formats.base import Declared, Format
 from unconstrain.recordings.formats.lerobot import LeRobot
+from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
 from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
 from unconstrain.recordings.preparation import Preparation
@@ -130,7 +131,7 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     every = [(file, robot is not None or len(files) > 1) for _, files, robot in located for file in files]
     with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
         formats = iter(list(pool.map(_open_file, every)))
-    opened = [[next(formats) for _ in files] for _, files, _ in located]
+    opened = [_joined(name, [next(formats) for _ in files]) for name, files, _ in located]
     recordings = tuple(
         _recording(own, name, short, stem, number, not several, columns, preparation, robot)
         for number, (own, (name, _, robot), short, stem) in enumerate(
@@ -145,11 +146,17 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
 def _open_file(about: tuple[File, bool]) -> Format:
     file, in_folder = about
     opened = recognize(file)
-    if in_folder and not isinstance(opened, Parquet):
+    if in_folder and not isinstance(opened, Parquet | Npy):
         raise DataError(f"{file.shown} is damaged or not a Parquet file; write it again")
     if isinstance(opened, Parquet):
         opened.row_groups  # noqa: B018 - read here, side by side with those of other files
     return opened
+
+
+def _joined(shown: str, formats: list[Format]) -> list[Format]:
+    """Make one format of the arrays of a folder; other files are read one after the other."""
+    arrays = [each for each in formats if isinstance(each, Npy)]
+    return [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
 
 
 def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:
@@ -157,6 +164,11 @@ def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, li
         return [(place.shown, [place], None)]
     robot = lerobot.recognize(place)
     files = list(robot.files if robot else place.parquet_files())
+    arrays = [] if files or robot else list(place.files(Npy.suffixes))
+    if arrays and not belong_together(arrays):
+        return [(file.shown, [file], None) for file in arrays]
+    if arrays:
+        return [(place.shown, arrays, None)]
     if not files:
         where = os.path.join(place.shown, "*.csv")
         raise DataError(

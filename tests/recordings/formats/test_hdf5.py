@@ -136,7 +136,9 @@ def test_what_differs_between_demonstrations_is_named(tmp_path):
             file[f"demo_{i}/x"] = np.random.default_rng(i).normal(size=(20, 2))
             file[f"demo_{i}/u"] = np.random.default_rng(i).normal(size=(20, width))
         file["demo_1/late"] = np.arange(20.0)
-    with pytest.raises(DataError, match=r"'u' has 2 numbers a sample in demonstration demo_0 but 3 in demo_2"):
+    with pytest.raises(
+        DataError, match=r"'u' has 2 numbers a sample in demonstration demo_0 but 3 in demo_2"
+    ):
         uc.load(tmp_path / "odd.h5", state="x", action="u")
     with pytest.raises(DataError, match=r"'late' is missing in demonstration demo_0"):
         uc.load(tmp_path / "odd.h5", state="x", action="late")

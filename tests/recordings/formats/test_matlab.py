@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import unconstrain as uc
@@ -86,6 +86,14 @@ def test_cells_of_matrices_beside_each_other_are_demonstrations(tmp_path):
     )
     read = uc.load(tmp_path / "m.mat", state="X", action="U")
     np.testing.assert_array_equal(read.states, np.concatenate([x for x, _ in parts]))
+
+
+def test_empty_cells_are_left_out_and_said(tmp_path):
+    demos = [{"x": x, "u": u} for x, u in movements((30, 40))]
+    scipy.io.savemat(tmp_path / "m.mat", {"demos": cells([demos[0], np.zeros((0, 0)), demos[1]])})
+    read = uc.load(tmp_path / "m.mat", state="x", action="u")
+    assert read.episode_labels == ("1", "3")
+    assert any("2 demonstrations found in demos (1 of 3 without numbers left out)" in n for n in read.notes)
 
 
 @settings(max_examples=60, deadline=None)

@@ -42,6 +42,21 @@ def test_files_of_a_folder_are_episodes(tmp_path):
         assert len(demos) == 73
 
 
+@pytest.mark.parametrize("folders", [(".",), ("demo_1", "demo_2", "demo_10")])
+def test_arrays_of_a_folder_are_columns_by_name(tmp_path, folders):
+    states, actions = np.random.default_rng(0).normal(size=(2, len(folders), 30, 3))
+    for i, folder in enumerate(folders):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        np.save(tmp_path / folder / "states.npy", states[i])
+        np.save(tmp_path / folder / "actions.npy", actions[i].T)
+        np.save(tmp_path / folder / "time.npy", np.arange(30) / 10)
+    demos = uc.load(tmp_path, state="states", action="actions")
+    np.testing.assert_array_equal(demos.states, states.reshape(-1, 3))
+    np.testing.assert_array_equal(demos.actions, actions.reshape(-1, 3))
+    assert demos.n_episodes == len(folders)
+    assert demos.time[29] == pytest.approx(2.9)
+
+
 def test_records_have_names(tmp_path):
     table = np.zeros(30, [("t", "f8"), ("x", "f4", 3), ("label", "U4")])
     table["t"], table["x"] = np.arange(30) / 10, np.random.default_rng(0).normal(size=(30, 3))

@@ -11,7 +11,7 @@ from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import Saved
 from unconstrain.recordings.formats.text import Text
 
-FORMATS: tuple[type[Format], ...] = (Parquet, Saved, Npz, Npy, Matlab, Matlab73, Hdf5, Text)
+FORMATS: tuple[type[Format], ...] = (Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Npz, Text)
 """In the order in which they are tried."""
 
 

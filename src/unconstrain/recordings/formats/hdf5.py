@@ -16,8 +16,11 @@ from unconstrain.recordings.formats.nested import RATES, STEPS, Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
-BLOCKS = (0, 512, 1024, 2048)
-"""Where in a file HDF5 may begin."""
+BLOCKS = (512, 1024, 2048)
+"""Where in a file HDF5 may begin after a block of the user's."""
+
+MAY_BEGIN_LATER = (".hdf5", ".h5", ".mat")
+"""Suffixes of files that are looked at further than at their beginning, which for others would be a request more."""
 
 ENVIRONMENT = "env_args"
 """Where robomimic and robosuite say how often a robot was controlled."""
@@ -121,6 +124,10 @@ class Hdf5(Nested):
 
 def is_hdf5(file: File) -> bool:
     """Whether a file holds HDF5, at its beginning or after a block of the user's."""
+    if file.magic.startswith(MAGIC):
+        return True
+    if file.suffix not in MAY_BEGIN_LATER:
+        return False
     begin = file.begin(BLOCKS[-1] + len(MAGIC))
     return any(begin[at : at + len(MAGIC)] == MAGIC for at in BLOCKS)
 

@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.errors import DataError
 from unconstrain.memory import available_memory, check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
@@ -19,7 +18,7 @@ from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
 GROWTH = 8
-"""How many times more memory than in the file numbers may take: MATLAB writes a float that is a small integer as a byte."""
+"""How many times more memory than in the file numbers may take: MATLAB writes floats that are small integers as bytes."""
 
 DEEPEST = 32
 """Structs within structs."""
@@ -68,11 +67,12 @@ class Matlab(Nested):
             needed = len(data) + GROWTH * float(_count_inflated(data))
             check_memory(needed, f"reading {shown}", "write a file a demonstration, or save it with -v7.3")
             # Cells of a shape that the file cannot hold would be allocated before they are read.
-            for _, shape, _ in scipy.io.whosmat(io.BytesIO(data)):
+            content: Any = io.BytesIO(data)
+            for _, shape, _ in scipy.io.whosmat(content):
                 size = int(np.prod(shape, dtype=object))
                 if 8.0 * size > max(needed, 1e6) * GROWTH:
                     raise ValueError("a variable has more values than the file")
-            variables = scipy.io.loadmat(io.BytesIO(data), chars_as_strings=True, simplify_cells=False)
+            variables = scipy.io.loadmat(content, chars_as_strings=True, simplify_cells=False)
             return {name: _node(value) for name, value in variables.items() if not name.startswith("__")}
 
 
@@ -161,7 +161,7 @@ def _node(value: Any, depth: int = 0) -> Node:
 
 
 def _count_inflated(data: bytes) -> int:
-    """Count the bytes that the variables of a file take when they are decompressed, at most those there is memory for."""
+    """Count the bytes that the variables of a file take when decompressed, or as many as there is memory for."""
     order = "<" if data[126:128] == b"IM" else ">"
     left = available_memory()
     at, count = 128, 0

@@ -35,7 +35,12 @@ EPISODE, TIME = "episode", "time"
 
 TIMES = frozenset({"t", "time", "times", "timestamp", "timestamps", "time_s", "stamp", "stamps"})
 STEPS = frozenset({"dt", "timestep", "time_step", "sample_time"})
-RATES = frozenset({"fps", "hz", "fs", "rate", "freq", "frequency", "control_freq", "sample_rate", "sampling_rate"})
+RATES = frozenset(
+    {"fps", "hz", "fs", "rate", "freq", "frequency", "control_freq", "sample_rate", "sampling_rate"}
+)
+
+MATRICES = ((3, 3), (3, 4), (4, 4))
+"""Shapes of rotations and poses."""
 
 HELD = 0.5
 """Share of steps without a change from which a sensor is taken to have stopped, where elsewhere it changes."""
@@ -78,9 +83,7 @@ class Nested:
             kind = _arrow_type(each.kind)
             if not each.width:
                 columns.append(Column(path, kind, rows))
-            columns += [
-                Column(f"{path}[{i}]", kind, rows, 0, path, i, each.width) for i in range(each.width)
-            ]
+            columns += [Column(f"{path}[{i}]", kind, rows, 0, path, i, each.width) for i in range(each.width)]
         if table.step is not None:
             columns.append(Column(table.time, pa.float64(), rows))
         if table.found.names:
@@ -171,14 +174,24 @@ class Nested:
     @cached_property
     def _declared(self) -> Declared | None:
         table = self._table
-        time = table.time if table.step is not None else next(
-            (path for path in table.stacked if _last(path, self.separator) in TIMES and self._increases(path)),
-            None,
+        time = (
+            table.time
+            if table.step is not None
+            else next(
+                (
+                    path
+                    for path in table.stacked
+                    if _last(path, self.separator) in TIMES and self._increases(path)
+                ),
+                None,
+            )
         )
         episode = table.episode if table.found.names else None
         if time is episode is None:
             return None
-        said = () if time is None or table.step is not None else (f"time is {time}; time= names another column",)
+        said = (
+            () if time is None or table.step is not None else (f"time is {time}; time= names another column",)
+        )
         return Declared(Columns(time=time, episode=episode), notes=said)
 
     def _increases(self, path: str) -> bool:
@@ -196,7 +209,9 @@ class Nested:
         parts = {name: table.stacked[name] for name in names if name in table.stacked}
         needed = sum(2.0 * 8 * length * max(each.width, 1) for each in parts.values())
         needed += sum(float(each.parts[which].size * each.kind.itemsize) for each in parts.values())
-        check_memory(needed, f"reading {self.file.shown}", "read fewer columns, or write shorter demonstrations")
+        check_memory(
+            needed, f"reading {self.file.shown}", "read fewer columns, or write shorter demonstrations"
+        )
         label = table.found.demonstrations[which].label
         values: list[pa.Array] = []
         with damage_named(self.file.shown, self.kind), self.opened() as fetch:
@@ -312,14 +327,18 @@ class _Held:
                     f"most steps of episode {label}, though in others: a sensor may have stopped there"
                 )
         more_notes = len(said) - 2 * MOST_NAMED
-        return [*said[: 2 * MOST_NAMED], f"so do columns of {more_notes} more episodes"] if more_notes > 0 else said
+        return (
+            [*said[: 2 * MOST_NAMED], f"so do columns of {more_notes} more episodes"]
+            if more_notes > 0
+            else said
+        )
 
 
 def _lay_out(tree: dict[str, Node], separator: str, file: File) -> _Table:
     found = _split_batches(find_demonstrations(tree), separator)
     labels = [each.label for each in found.demonstrations]
     arrays = [
-        {path or found.names[0]: leaf for path, leaf in leaves(each.content, separator)}
+        {path or found.members[0]: leaf for path, leaf in leaves(each.content, separator)}
         for each in found.demonstrations
     ]
     lengths = find_lengths(arrays)
@@ -356,15 +375,18 @@ def _split_batches(found: Found, separator: str) -> Found:
         return found
     every = dict(leaves(found.demonstrations[0].content, separator))
     arrays = {path: leaf for path, leaf in every.items() if isinstance(leaf, Leaf) and leaf.size > 1}
-    deep = {leaf.shape[:2] for leaf in arrays.values() if len(leaf.shape) == 3}
-    if len(deep) != 1:
+    deep = [leaf.shape for leaf in arrays.values() if len(leaf.shape) == 3]
+    if not deep:
         return found
-    n_episodes, length = next(iter(deep))
+    n_episodes, length = deep[0][0], max(deep[0])
     fits = all(
-        leaf.shape[:2] == (n_episodes, length) or leaf.shape == (n_episodes,) for leaf in arrays.values()
+        shape[0] == n_episodes
+        and max(shape) == length in shape[1:]
+        and not (shape[2] == length and shape[:2] in MATRICES)
+        for shape in deep
     )
-    longest = all(max(leaf.shape) <= length and length not in leaf.shape[2:] for leaf in arrays.values())
-    if not (fits and longest):
+    others = (leaf.shape for leaf in arrays.values() if len(leaf.shape) != 3)
+    if not fits or any(shape not in ((n_episodes, length), (n_episodes,)) for shape in others):
         return found
     rest = {path: node for path, node in every.items() if path not in arrays}
     demonstrations = tuple(
@@ -387,16 +409,21 @@ def _find_step(
     """Find the time step or the rate: of each demonstration, or else of the file."""
     wanted = STEPS | RATES
     for path, each in stacked.items():
-        if _last(path, separator) in wanted and each.kind.kind in "iuf" and not any(
-            axis is not None for axis in each.axes
+        if (
+            _last(path, separator) in wanted
+            and each.kind.kind in "iuf"
+            and not any(axis is not None for axis in each.axes)
         ):
             return each, path
     for path, node in beside.items():
-        if isinstance(node, Leaf) and _last(path, separator) in wanted:
-            if node.size == 1 and node.kind.kind in "iuf":
-                parts = (node,) * n_demonstrations
-                return Stacked(parts, (None,) * n_demonstrations, 0, node.kind), path
+        if isinstance(node, Leaf) and _last(path, separator) in wanted and _is_number(node):
+            parts = (node,) * n_demonstrations
+            return Stacked(parts, (None,) * n_demonstrations, 0, node.kind), path
     return None, ""
+
+
+def _is_number(leaf: Leaf) -> bool:
+    return leaf.size == 1 and leaf.kind.kind in "iuf"
 
 
 def _last(path: str, separator: str) -> str:

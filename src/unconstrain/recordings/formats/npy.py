@@ -1,7 +1,11 @@
-"""Single NumPy arrays: (N,), (N, k), (episodes, time, dimensions), and records."""
+"""NumPy arrays in files of their own: (N,), (N, k), (episodes, time, dimensions), records, and folders of them."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import PurePosixPath
 from typing import Any, ClassVar
 
 import numpy as np
@@ -61,6 +65,81 @@ class Npy(Nested):
             return part if leaf.index is None else part[leaf.index]
 
         yield fetch
+
+
+class NpyFolder(Nested):
+    """A folder of arrays that belong together, each called by its path in the folder, as in `states[0]`.
+
+    Folders in it whose names differ by a number only are demonstrations.
+
+    Parameters
+    ----------
+    shown : str
+        The folder, as the user calls it.
+    files : sequence of Npy
+        The arrays in it.
+    """
+
+    at_once: ClassVar[bool] = True
+    separator: ClassVar[str] = "/"
+    kind: ClassVar[str] = "a folder of NumPy arrays"
+
+    def __init__(self, shown: str, files: Sequence[Npy]) -> None:
+        super().__init__(replace(files[0].file, shown=shown))
+        self._files = tuple(files)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the files alone."""
+        files = tuple(Npy(replace(each.file)) for each in self._files)
+        return {**super().__getstate__(), "_files": files}
+
+    def identity(self) -> str:
+        """Say what tells the files from others."""
+        return repr([each.identity() for each in self._files])
+
+    def tree(self) -> dict[str, Node]:
+        """Read the types and shapes of the arrays."""
+        tree: dict[str, Node] = {}
+        paths = _relative([each.file for each in self._files])
+        for number, (each, path) in enumerate(zip(self._files, paths, strict=True)):
+            inner = tree
+            *folders, name = path
+            for folder in folders:
+                below = inner.setdefault(folder, {})
+                assert isinstance(below, dict)
+                inner = below
+            fields = {
+                field: replace(node, where=(number, node.where)) if isinstance(node, Leaf) else node
+                for field, node in each.tree().items()
+            }
+            inner[name] = fields.get(ARRAY, fields)
+        return tree
+
+    @contextmanager
+    def opened(self) -> Iterator[Fetch]:
+        """Read arrays as they are asked for."""
+        with ExitStack() as stack:
+            opened: dict[int, Fetch] = {}
+
+            def fetch(leaf: Leaf) -> NDArray[Any]:
+                number, where = leaf.where
+                if number not in opened:
+                    opened[number] = stack.enter_context(self._files[number].opened())
+                return opened[number](replace(leaf, where=where))
+
+            yield fetch
+
+
+def belong_together(files: Sequence[File]) -> bool:
+    """Whether arrays of a folder are parts of one recording, and not an episode each, whose names are numbered."""
+    return len({re.sub(r"\d+", "#", "/".join(path)) for path in _relative(files)}) > 1
+
+
+def _relative(files: Sequence[File]) -> list[tuple[str, ...]]:
+    """Return the folders and the name without suffix by which each file lies in the folder of them all."""
+    paths = [PurePosixPath(file.path) for file in files]
+    root = os.path.commonpath([path.parent for path in paths])
+    return [path.relative_to(root).with_suffix("").parts for path in paths]
 
 
 def _read_shape(content: Any) -> tuple[tuple[int, ...], np.dtype]:

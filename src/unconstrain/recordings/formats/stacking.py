@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,21 +70,11 @@ def find_lengths(demonstrations: Sequence[Mapping[str, Leaf | Odd]]) -> list[int
             lengths_at.setdefault((path, axis), set()).add(length)
     found = []
     for arrays in demonstrations:
-        votes: Counter[int] = Counter()
-        differing: set[int] = set()
-        for length, path in {(length, path) for path, _, length in _axes(arrays)}:
-            votes[length] += 1
-        for path, axis, length in _axes(arrays):
-            if len(lengths_at[path, axis]) > 1:
-                differing.add(length)
+        votes = Counter(length for length, _ in {(length, path) for path, _, length in _axes(arrays)})
         longest = max(votes, default=0)
-        found.append(
-            max(
-                votes,
-                key=lambda n: (votes[n] + (n in differing) + (n == longest), n),  # noqa: B023 - used at once
-                default=0,
-            )
-        )
+        votes[longest] += 1
+        votes.update({n for path, axis, n in _axes(arrays) if len(lengths_at[path, axis]) > 1})
+        found.append(max(votes, key=partial(_rank, votes)))
     return found
 
 
@@ -130,7 +121,7 @@ def _stack_one(
         if node is None:
             return f"is missing in demonstration {label}"
         if isinstance(node, Odd):
-            return node.reason
+            return node.reason if len(nodes) == 1 else f"{node.reason} in demonstration {label}"
         if node.kind.kind not in "biufUS":
             return f"holds values of type {node.kind}"
         axis = _time_axis(node.shape, length, leading)
@@ -174,6 +165,10 @@ def _time_axis(shape: Shape, length: int, leading: bool) -> int | None:
     if not places or (length == 1 and int(np.prod(shape, dtype=object)) == 1):
         return None
     return places[0] if leading else places[-1]
+
+
+def _rank(votes: Counter[int], length: int) -> tuple[int, int]:
+    return votes[length], length
 
 
 def _axes(arrays: Mapping[str, Leaf | Odd]) -> list[tuple[str, int, int]]:

@@ -204,8 +204,11 @@ def _lists(tree: Mapping[str, Node], path: tuple[str, ...]) -> Iterator[Found]:
                     content |= part
                 else:
                     content[name] = part
-            demonstrations.append(Demonstration(i + 1, content))
-        yield Found(path, tuple(alike), tuple(alike), tuple(demonstrations))
+            if numbers_in(content):
+                demonstrations.append(Demonstration(i + 1, content))
+        empty = length - len(demonstrations)
+        said = f" ({empty} of {length} without numbers left out)" if empty else ""
+        yield Found(path, tuple(f"{name}{said}" for name in alike), tuple(alike), tuple(demonstrations))
 
 
 def _groups(tree: Mapping[str, Node], path: tuple[str, ...]) -> Iterator[Found]:

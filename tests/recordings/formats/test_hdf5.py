@@ -130,6 +130,25 @@ def test_matrices_of_one_recording_are_not_episodes(tmp_path):
     assert (len(demos), demos.n_episodes) == (200, 1)
 
 
+def test_records_are_columns_by_name(tmp_path):
+    table = np.zeros(30, [("time", "f8"), ("x", "f4", 3), ("n", "i4")])
+    table["time"], table["x"] = np.arange(30) / 10, np.random.default_rng(0).normal(size=(30, 3))
+    with h5py.File(tmp_path / "r.h5", "w") as file:
+        file["log/table"] = table
+    demos = uc.load(tmp_path / "r.h5", state="log/table/x")
+    np.testing.assert_allclose(demos.states, table["x"])
+    assert any("time is log/table/time" in note for note in demos.notes)
+
+
+def test_projections_are_lists_row_by_row(tmp_path):
+    P = np.tile(np.diag([1.0, 0.0]), (30, 1, 1))
+    with h5py.File(tmp_path / "p.h5", "w") as file:
+        file["x"], file["u"] = np.random.default_rng(0).normal(size=(2, 30, 2))
+        file["P"] = P
+    demos = uc.load(tmp_path / "p.h5", state="x", action="u", projections="P")
+    np.testing.assert_array_equal(demos.projections, P)
+
+
 def test_what_differs_between_demonstrations_is_named(tmp_path):
     with h5py.File(tmp_path / "odd.h5", "w") as file:
         for i, width in enumerate((2, 2, 3)):

@@ -127,9 +127,11 @@ def test_structs_nested_deeper_have_dotted_paths_and_dt_gives_the_time(tmp_path)
     assert any("steps of 0.02 s, as log.dt says" in note for note in read.notes)
 
 
-def test_plain_matrices_are_one_recording(tmp_path):
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_plain_matrices_are_one_recording(tmp_path, version):
     x, u = movements((50,))[0]
-    scipy.io.savemat(tmp_path / "p.mat", {"x": x, "u": u, "t": np.arange(50.0)[:, None], "gains": np.eye(4)})
+    variables = {"x": x, "u": u, "t": np.arange(50.0)[:, None], "gains": np.eye(4)}
+    scipy.io.savemat(tmp_path / "p.mat", variables, format=version)
     read = uc.load(tmp_path / "p.mat", state="x", action="u")
     assert (len(read), read.n_episodes) == (50, 1)
     with pytest.raises(DataError, match=r"'gains' has shape \(4, 4\).*no axis has the 50 samples"):

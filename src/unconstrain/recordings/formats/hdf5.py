@@ -62,6 +62,9 @@ class Hdf5(Nested):
             def fetch(leaf: Leaf) -> NDArray[Any]:
                 if isinstance(leaf.where, np.ndarray):
                     return leaf.where
+                if isinstance(leaf.where, tuple):
+                    name, field = leaf.where
+                    return opened[name][field]
                 return self.fetch(opened[leaf.where], leaf.index)
 
             yield fetch
@@ -76,8 +79,10 @@ class Hdf5(Nested):
                 return Odd("lies in another file")
             if item.shape is None or not item.size:
                 return Odd("is empty")
-            if item.dtype.hasobject or item.dtype.names:
-                return Odd("holds text or references" if item.dtype.hasobject else "holds records")
+            if item.dtype.names:
+                return self.records(item)
+            if item.dtype.hasobject:
+                return Odd("holds text or references")
             return self.leaf(item)
         if not isinstance(item, h5py.Group):
             return Odd("is a type of data")
@@ -102,6 +107,16 @@ class Hdf5(Nested):
     def leaf(self, item: Any) -> Leaf:
         """Describe an array."""
         return Leaf(tuple(item.shape), item.dtype, item.name)
+
+    def records(self, item: Any) -> Node:
+        """Describe the fields of an array of records."""
+        fields = {name: item.dtype.fields[name][0] for name in item.dtype.names}
+        return {
+            name: Odd("holds text or references")
+            if kind.hasobject or kind.names
+            else Leaf((*item.shape, *kind.shape), kind.base, (item.name, name))
+            for name, kind in fields.items()
+        }
 
     def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
         """Read an array."""

@@ -18,7 +18,7 @@ from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
 GROWTH = 8
-"""How many times more memory than in the file numbers may take: MATLAB writes floats that are small integers as bytes."""
+"""How many times more memory than in the file numbers may take: floats that are small integers are written as bytes."""
 
 DEEPEST = 32
 """Structs within structs."""
@@ -162,6 +162,8 @@ def _node(value: Any, depth: int = 0) -> Node:
 
 def _count_inflated(data: bytes) -> int:
     """Count the bytes that the variables of a file take when decompressed, or as many as there is memory for."""
+    if 0 in data[:4]:  # version 4, which compresses nothing
+        return len(data)
     order = "<" if data[126:128] == b"IM" else ">"
     left = available_memory()
     at, count = 128, 0

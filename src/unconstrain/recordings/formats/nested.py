@@ -79,16 +79,20 @@ class Nested:
         """Return the arrays of the demonstrations as columns."""
         table, rows = self._table, sum(self.row_groups)
         columns: list[Column] = []
+        lists: dict[str, tuple[pa.DataType, int | None]] = {}
         for path, each in table.stacked.items():
             kind = _arrow_type(each.kind)
             if not each.width:
                 columns.append(Column(path, kind, rows))
-            columns += [Column(f"{path}[{i}]", kind, rows, 0, path, i, each.width) for i in range(each.width)]
+                continue
+            lists[path] = pa.list_(kind, each.width), rows
+            parts = range(each.width)
+            columns += [Column(f"{path}[{i}]", kind, rows, 0, path, i, each.width) for i in parts]
         if table.step is not None:
             columns.append(Column(table.time, pa.float64(), rows))
         if table.found.names:
             columns.append(Column(table.episode, table.labels.type, rows))
-        return Header(self.file.shown, columns, {}, table.unusable)
+        return Header(self.file.shown, columns, lists, table.unusable)
 
     def declared(self) -> Declared | None:
         """Return which column tells episodes apart, and which is the time, where these are known."""
@@ -109,15 +113,17 @@ class Nested:
         guesses = table.guesses(names)
         held = _Held()
         begin = 0
-        for which, length in enumerate(table.lengths):
-            low, high = max(start - begin, 0), min(stop - begin, length)
-            if low < high:
-                values = self._read_one(which, names, held if high - low == length else None)
-                said = [*guesses, *(held.notes() if begin + high == stop else ())]
-                about = {GUESS: "\n".join(said)} if said else None
-                batch = pa.RecordBatch.from_arrays(values, names=names, metadata=about)
-                yield begin + low, batch.slice(low, high - low)
-            begin += length
+        with damage_named(self.file.shown, self.kind), self.opened() as fetch:
+            for which, length in enumerate(table.lengths):
+                low, high = max(start - begin, 0), min(stop - begin, length)
+                if low < high:
+                    whole = high - low == length
+                    values = self._read_one(fetch, which, names, held if whole else None)
+                    said = [*guesses, *(held.notes() if begin + high == stop else ())]
+                    about = {GUESS: "\n".join(said)} if said else None
+                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=about)
+                    yield begin + low, batch.slice(low, high - low)
+                begin += length
 
     def place(self, index: int) -> str:
         """Say in which demonstration a row is."""
@@ -199,10 +205,13 @@ class Nested:
         each = self._table.stacked[path]
         if each.width or each.kind.kind not in "iuf" or any(axis is None for axis in each.axes):
             return False
-        values = (self._read_one(which, [path], None)[0] for which in range(len(each.parts)))
-        return all(bool(np.all(np.diff(np.asarray(column, np.float64)) > 0)) for column in values)
+        with damage_named(self.file.shown, self.kind), self.opened() as fetch:
+            values = (self._read_one(fetch, which, [path], None)[0] for which in range(len(each.parts)))
+            return all(bool(np.all(np.diff(np.asarray(column, np.float64)) > 0)) for column in values)
 
-    def _read_one(self, which: int, names: Sequence[str], held: "_Held | None") -> list[pa.Array]:
+    def _read_one(
+        self, fetch: Fetch, which: int, names: Sequence[str], held: "_Held | None"
+    ) -> list[pa.Array]:
         """Read columns of one demonstration."""
         table = self._table
         length = table.lengths[which]
@@ -214,27 +223,26 @@ class Nested:
         )
         label = table.found.demonstrations[which].label
         values: list[pa.Array] = []
-        with damage_named(self.file.shown, self.kind), self.opened() as fetch:
-            for name in names:
-                if name == table.time and table.step is not None:
-                    values.append(pa.array(np.arange(length) * table.seconds[which]))
-                    continue
-                if name not in parts:
-                    values.append(pa.array([table.labels[which].as_py()] * length, table.labels.type))
-                    continue
-                each = parts[name]
-                array = np.asarray(fetch(each.parts[which]))
-                if array.shape != each.parts[which].shape:
-                    raise ValueError("an array has another shape than it promises")
-                if each.axes[which] is None:
-                    array = np.repeat(array.reshape(-1)[:1], length)
-                    if each.width:
-                        array = array[:, None]
-                else:
-                    array = each.arrange(which, array)
-                    if held is not None:
-                        held.add(name, array, label)
-                values.append(to_arrow(array.astype(each.kind, copy=False)))
+        for name in names:
+            if name == table.time and table.step is not None:
+                values.append(pa.array(np.arange(length) * table.seconds[which]))
+                continue
+            if name not in parts:
+                values.append(pa.array([table.labels[which].as_py()] * length, table.labels.type))
+                continue
+            each = parts[name]
+            array = np.asarray(fetch(each.parts[which]))
+            if array.shape != each.parts[which].shape:
+                raise ValueError("an array has another shape than it promises")
+            if each.axes[which] is None:
+                array = np.repeat(array.reshape(-1)[:1], length)
+                if each.width:
+                    array = array[:, None]
+            else:
+                array = each.arrange(which, array)
+                if held is not None:
+                    held.add(name, array, label)
+            values.append(to_arrow(array.astype(each.kind, copy=False)))
         return values
 
 
@@ -349,7 +357,10 @@ def _lay_out(tree: dict[str, Node], separator: str, file: File) -> _Table:
         reason = node.reason if isinstance(node, Odd) else "lies beside the demonstrations"
         unusable.setdefault(path, reason)
     episode = next(name for name in (EPISODE, "demonstration", "_episode") if name not in stacked)
-    has_time = any(_last(path, separator) in TIMES and not each.width for path, each in stacked.items())
+    has_time = any(
+        _last(path, separator) in TIMES and not each.width and None not in each.axes
+        for path, each in stacked.items()
+    )
     step, step_name = None, ""
     if not has_time:
         step, step_name = _find_step(stacked, beside, separator, len(labels))

@@ -122,7 +122,7 @@ def _stack_one(
             return f"is missing in demonstration {label}"
         if isinstance(node, Odd):
             return node.reason if len(nodes) == 1 else f"{node.reason} in demonstration {label}"
-        if node.kind.kind not in "biufUS":
+        if node.kind.kind not in "biufUSMm":
             return f"holds values of type {node.kind}"
         axis = _time_axis(node.shape, length, leading)
         if axis is None and node.size != 1:

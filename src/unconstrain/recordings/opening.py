@@ -15,6 +15,7 @@ from unconstrain.recordings.files import File, Folder, label, locate, short_name
 from unconstrain.recordings.formats import lerobot, recognize
 from unconstrain.recordings.formats.base import Declared, Format
 from unconstrain.recordings.formats.lerobot import LeRobot
+from unconstrain.recordings.formats.nested import Nested
 from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
 from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
@@ -131,7 +132,9 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     every = [(file, robot is not None or len(files) > 1) for _, files, robot in located for file in files]
     with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
         formats = iter(list(pool.map(_open_file, every)))
-    opened = [_joined(name, [next(formats) for _ in files]) for name, files, _ in located]
+    opened = [
+        _joined(name, [next(formats) for _ in files], preparation.time_axis) for name, files, _ in located
+    ]
     recordings = tuple(
         _recording(own, name, short, stem, number, not several, columns, preparation, robot)
         for number, (own, (name, _, robot), short, stem) in enumerate(
@@ -153,10 +156,15 @@ def _open_file(about: tuple[File, bool]) -> Format:
     return opened
 
 
-def _joined(shown: str, formats: list[Format]) -> list[Format]:
-    """Make one format of the arrays of a folder; other files are read one after the other."""
+def _joined(shown: str, formats: list[Format], time_axis: str | None) -> list[Format]:
+    """Make one format of the arrays of a folder, and say which axis is time; other files are read in turn."""
     arrays = [each for each in formats if isinstance(each, Npy)]
-    return [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
+    joined: list[Format] = [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
+    if time_axis is None:
+        return joined
+    if not all(isinstance(each, Nested) for each in joined):
+        raise DataError(f"{shown}: time_axis= is for arrays in MATLAB, HDF5 and .npy files; leave it out")
+    return [each.with_time_axis(time_axis) for each in joined if isinstance(each, Nested)]
 
 
 def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:

@@ -9,6 +9,8 @@ from unconstrain.errors import DataError
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Ticks a second."""
 
+TIME_AXES = ("first", "last")
+
 
 @dataclass(frozen=True)
 class Preparation:
@@ -31,11 +33,14 @@ class Preparation:
         Fragments of a split episode that are shorter than this (s) are dropped. Episodes that were not split stay.
     force_threshold : float, optional
         A force above this, in its own unit, is a contact. Needed where `force` is given.
+    time_axis : {"first", "last"}, optional
+        Which axis of a demonstration's arrays is time, in MATLAB, HDF5 and .npy files. By default it is found, which is
+        noted.
 
     Raises
     ------
     DataError
-        A number is not positive and finite, or the time unit is unknown.
+        A number is not positive and finite, or the time unit or axis is unknown.
     """
 
     time_unit: str | None = None
@@ -45,6 +50,7 @@ class Preparation:
     min_speed: float | None = None
     min_duration: float | None = None
     force_threshold: float | None = None
+    time_axis: str | None = None
 
     def __post_init__(self) -> None:
         unit = self.time_unit
@@ -52,9 +58,14 @@ class Preparation:
             raise DataError(
                 f"time_unit must be one of {', '.join(TIME_UNITS)}, got {' '.join(repr(unit).split()):.60}"
             )
+        axis = self.time_axis
+        if axis is not None and not (isinstance(axis, str) and axis in TIME_AXES):
+            raise DataError(
+                f"time_axis must be one of {', '.join(TIME_AXES)}, got {' '.join(repr(axis).split()):.60}"
+            )
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name == "time_unit" or value is None:
+            if field.name in ("time_unit", "time_axis") or value is None:
                 continue
             try:
                 number = float(value)

@@ -23,6 +23,19 @@ def test_samples_in_columns_are_turned_and_said(tmp_path):
     assert any("dimensions x time (4 x 60)" in note for note in demos.notes)
 
 
+def test_the_axis_of_time_can_be_given(tmp_path):
+    table = np.random.default_rng(0).normal(size=(5, 60))
+    np.save(tmp_path / "a.npy", table)
+    demos = uc.load(tmp_path / "a.npy", state=range(30), action=range(30, 60), time_axis="first")
+    np.testing.assert_array_equal(np.hstack([demos.states, demos.actions]), table)
+    assert not demos.notes
+    (tmp_path / "a.csv").write_text("x,u\n1,2\n3,4\n")
+    with pytest.raises(DataError, match="time_axis= is for arrays"):
+        uc.load(tmp_path / "a.csv", state=0, action=1, time_axis="first")
+    with pytest.raises(DataError, match="time_axis must be one of first, last"):
+        uc.load(tmp_path / "a.npy", state=0, action=1, time_axis="second")
+
+
 @pytest.mark.parametrize("axes", [(0, 1, 2), (0, 2, 1)])
 def test_batches_are_episodes(tmp_path, axes):
     table = np.random.default_rng(0).normal(size=(5, 60, 4))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
@@ -69,6 +70,13 @@ class Nested:
 
     def __init__(self, file: File) -> None:
         self.file = file
+        self.time_axis: str | None = None
+
+    def with_time_axis(self, axis: str) -> "Nested":
+        """Return the same file, in whose demonstrations the first or the last axis is time, as a user says."""
+        other = copy(self)
+        other.time_axis = axis
+        return other
 
     @classmethod
     def matches(cls, file: File) -> bool:
@@ -145,7 +153,7 @@ class Nested:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the file alone: what was read of it may be large."""
-        return {"file": replace(self.file)}
+        return {"file": replace(self.file), "time_axis": self.time_axis}
 
     def tree(self) -> dict[str, Node]:
         """Read what there is in the file. Each format has its own."""
@@ -160,7 +168,7 @@ class Nested:
         shown = self.file.shown
         with damage_named(shown, self.kind):
             tree = self.tree()
-            table = _lay_out(tree, self.separator, self.file)
+            table = _lay_out(tree, self.separator, self.time_axis)
         if not table.stacked or not sum(table.lengths):
             reasons = [f"{path!r} {reason}" for path, reason in table.unusable.items()]
             why = f" ({'; '.join(reasons[:MOST_NAMED])})" if reasons else ""
@@ -260,6 +268,7 @@ class _Table(NamedTuple):
     step_name: str
     is_rate: bool
     beside: tuple[str, ...]
+    time_axis: str | None
     seconds: tuple[float, ...] = ()
 
     def guesses(self, names: Sequence[str]) -> list[str]:
@@ -282,14 +291,14 @@ class _Table(NamedTuple):
             )
         orders: dict[str, list[str]] = {}
         for name in dict.fromkeys(names):
-            if name in self.stacked:
+            if name in self.stacked and self.time_axis is None:
                 order = self._order(self.stacked[name])
                 if order:
                     orders.setdefault(order, []).append(name)
         for order, arrays in orders.items():
             said.append(
-                f"{', '.join(arrays)} {'is' if len(arrays) == 1 else 'are'} read as {order}; if that is wrong, write "
-                "the file with one row a sample"
+                f"{', '.join(arrays)} {'is' if len(arrays) == 1 else 'are'} read as {order}; time_axis= says "
+                "which axis is time"
             )
         return said
 
@@ -342,15 +351,15 @@ class _Held:
         )
 
 
-def _lay_out(tree: dict[str, Node], separator: str, file: File) -> _Table:
-    found = _split_batches(find_demonstrations(tree), separator)
+def _lay_out(tree: dict[str, Node], separator: str, time_axis: str | None) -> _Table:
+    found = _split_batches(find_demonstrations(tree), separator, time_axis)
     labels = [each.label for each in found.demonstrations]
     arrays = [
         {path or found.members[0]: leaf for path, leaf in leaves(each.content, separator)}
         for each in found.demonstrations
     ]
-    lengths = find_lengths(arrays)
-    stacked, unusable = stack(arrays, lengths, labels)
+    lengths = find_lengths(arrays, time_axis)
+    stacked, unusable = stack(arrays, lengths, labels, time_axis)
     stacked = {path: replace(each, kind=_plain(each.kind)) for path, each in stacked.items()}
     beside = outside(tree, found, separator)
     for path, node in beside.items():
@@ -377,10 +386,11 @@ def _lay_out(tree: dict[str, Node], separator: str, file: File) -> _Table:
         step_name,
         _last(step_name, separator) in RATES,
         tuple(path for path, node in beside.items() if numbers_in(node) > 1),
+        time_axis,
     )
 
 
-def _split_batches(found: Found, separator: str) -> Found:
+def _split_batches(found: Found, separator: str, time_axis: str | None) -> Found:
     """Take arrays (episodes, time, dimensions) apart, where all of a file's arrays are of this form."""
     if found.names:
         return found
@@ -390,6 +400,8 @@ def _split_batches(found: Found, separator: str) -> Found:
     if not deep:
         return found
     n_episodes, length = deep[0][0], max(deep[0])
+    if time_axis is not None:
+        length = deep[0][1 if time_axis == "first" else 2]
     fits = all(
         shape[0] == n_episodes
         and max(shape) == length in shape[1:]

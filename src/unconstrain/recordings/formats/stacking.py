@@ -48,7 +48,9 @@ class Stacked:
         return rows.reshape(len(rows), -1)[:, 0] if not self.width else rows.reshape(len(rows), -1)
 
 
-def find_lengths(demonstrations: Sequence[Mapping[str, Leaf | Odd]]) -> list[int]:
+def find_lengths(
+    demonstrations: Sequence[Mapping[str, Leaf | Odd]], time_axis: str | None = None
+) -> list[int]:
     """Find how many samples each demonstration has.
 
     It is the length that most of a demonstration's arrays have an axis of. Where the axes of several lengths are as
@@ -58,6 +60,8 @@ def find_lengths(demonstrations: Sequence[Mapping[str, Leaf | Odd]]) -> list[int
     ----------
     demonstrations : sequence of mapping of str to Leaf or Odd
         The arrays by path.
+    time_axis : {"first", "last"}, optional
+        Which axis is time, where that is known.
 
     Returns
     -------
@@ -66,20 +70,25 @@ def find_lengths(demonstrations: Sequence[Mapping[str, Leaf | Odd]]) -> list[int
     """
     lengths_at: dict[tuple[str, int], set[int]] = {}
     for arrays in demonstrations:
-        for path, axis, length in _axes(arrays):
+        for path, axis, length in _axes(arrays, time_axis):
             lengths_at.setdefault((path, axis), set()).add(length)
     found = []
     for arrays in demonstrations:
-        votes = Counter(length for length, _ in {(length, path) for path, _, length in _axes(arrays)})
+        votes = Counter(
+            length for length, _ in {(length, path) for path, _, length in _axes(arrays, time_axis)}
+        )
         longest = max(votes, default=0)
         votes[longest] += 1
-        votes.update({n for path, axis, n in _axes(arrays) if len(lengths_at[path, axis]) > 1})
+        votes.update({n for path, axis, n in _axes(arrays, time_axis) if len(lengths_at[path, axis]) > 1})
         found.append(max(votes, key=partial(_rank, votes)))
     return found
 
 
 def stack(
-    demonstrations: Sequence[Mapping[str, Leaf | Odd]], lengths: Sequence[int], labels: Sequence[str | int]
+    demonstrations: Sequence[Mapping[str, Leaf | Odd]],
+    lengths: Sequence[int],
+    labels: Sequence[str | int],
+    time_axis: str | None = None,
 ) -> tuple[dict[str, Stacked], dict[str, str]]:
     """Stack the arrays of demonstrations that fit together.
 
@@ -91,6 +100,8 @@ def stack(
         As `find_lengths` gives them.
     labels : sequence of (str or int)
         What a sentence calls each.
+    time_axis : {"first", "last"}, optional
+        Which axis is time, where that is known.
 
     Returns
     -------
@@ -99,11 +110,12 @@ def stack(
     unusable : dict of str to str
         Of all other paths, the reason.
     """
-    leading = _usual_order(demonstrations, lengths)
+    leading = _usual_order(demonstrations, lengths) if time_axis is None else time_axis == "first"
+    strict = time_axis is not None
     stacked: dict[str, Stacked] = {}
     unusable: dict[str, str] = {}
     for path in dict.fromkeys(path for arrays in demonstrations for path in arrays):
-        result = _stack_one([arrays.get(path) for arrays in demonstrations], lengths, labels, leading)
+        result = _stack_one([arrays.get(path) for arrays in demonstrations], lengths, labels, leading, strict)
         if isinstance(result, str):
             unusable[path] = result
         else:
@@ -112,7 +124,11 @@ def stack(
 
 
 def _stack_one(
-    nodes: Sequence[Leaf | Odd | None], lengths: Sequence[int], labels: Sequence[str | int], leading: bool
+    nodes: Sequence[Leaf | Odd | None],
+    lengths: Sequence[int],
+    labels: Sequence[str | int],
+    leading: bool,
+    strict: bool,
 ) -> Stacked | str:
     parts: list[Leaf] = []
     axes: list[int | None] = []
@@ -124,7 +140,7 @@ def _stack_one(
             return node.reason if len(nodes) == 1 else f"{node.reason} in demonstration {label}"
         if node.kind.kind not in "biufUSMm":
             return f"holds values of type {node.kind}"
-        axis = _time_axis(node.shape, length, leading)
+        axis = _time_axis(node.shape, length, leading, strict)
         if axis is None and node.size != 1:
             return (
                 f"has shape {node.shape} in demonstration {label}, in which no axis has the {length} samples "
@@ -160,8 +176,10 @@ def _usual_order(demonstrations: Sequence[Mapping[str, Leaf | Odd]], lengths: Se
     return first >= last
 
 
-def _time_axis(shape: Shape, length: int, leading: bool) -> int | None:
+def _time_axis(shape: Shape, length: int, leading: bool, strict: bool) -> int | None:
     places = [axis for axis, size in enumerate(shape) if size == length]
+    if strict and sum(size != 1 for size in shape) > 1:
+        places = [axis for axis in places if axis == (0 if leading else len(shape) - 1)]
     if not places or (length == 1 and int(np.prod(shape, dtype=object)) == 1):
         return None
     return places[0] if leading else places[-1]
@@ -171,11 +189,17 @@ def _rank(votes: Counter[int], length: int) -> tuple[int, int]:
     return votes[length], length
 
 
-def _axes(arrays: Mapping[str, Leaf | Odd]) -> list[tuple[str, int, int]]:
+def _axes(arrays: Mapping[str, Leaf | Odd], time_axis: str | None) -> list[tuple[str, int, int]]:
+    """Return by path each axis that may be time, and its length."""
     return [
         (path, axis, length)
         for path, node in arrays.items()
         if isinstance(node, Leaf) and node.kind.kind in "biuf" and node.numbers
         for axis, length in enumerate(node.shape)
         if length > 1
+        and (
+            time_axis is None
+            or node.size == length
+            or axis == (0 if time_axis == "first" else len(node.shape) - 1)
+        )
     ]

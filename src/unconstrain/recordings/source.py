@@ -292,10 +292,10 @@ def open(
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
         A file in CSV, TSV, TXT, NPZ, NPY, MATLAB, HDF5 or Parquet; on disk, or at a URI such as ``s3://bucket/file``
         that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording,
-        one of .npy arrays, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any iterable of ``(X, U)``,
-        ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
-        None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
-        iterable, which can then be read more than once.
+        one of .npy arrays, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any
+        iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d),
+        episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not known; or a function
+        that returns such an iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.

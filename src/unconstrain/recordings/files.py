@@ -117,14 +117,18 @@ class Folder:
         return File(f"{self.shown.rstrip('/')}/{name}", f"{self.path.rstrip('/')}/{name}", self.filesystem)
 
     def parquet_files(self, within: str = "") -> tuple[File, ...]:
-        """List the Parquet files in the folder and the folders in it, in the order of their names.
+        """List the Parquet files in the folder and the folders in it, in the order of their names."""
+        return self.files(PARQUET, within)
+
+    def files(self, suffixes: str | tuple[str, ...], within: str = "") -> tuple[File, ...]:
+        """List the files with one of these suffixes in the folder and the folders in it, in the order of their names.
 
         Names that begin with a dot or an underscore are others' records. A file that is there twice, through a link, is
         listed once, and a folder that links to one above it is not entered again.
         """
         root = f"{self.path.rstrip('/')}/{within}" if within else self.path
         paths = _walk(root) if isinstance(self.filesystem, pyarrow.fs.LocalFileSystem) else self._list(root)
-        files = sorted((path for path in paths if path.lower().endswith(PARQUET)), key=natural)
+        files = sorted((path for path in paths if path.lower().endswith(suffixes)), key=natural)
         return tuple(File(self._shown(path), path, self.filesystem) for path in files)
 
     def _list(self, root: str) -> list[str]:

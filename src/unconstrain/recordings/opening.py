@@ -16,6 +16,8 @@ from unconstrain.recordings.files import File, Folder, label, locate, short_name
 from unconstrain.recordings.formats import lerobot, recognize
 from unconstrain.recordings.formats.base import Declared, Format
 from unconstrain.recordings.formats.lerobot import LeRobot
+from unconstrain.recordings.formats.nested import Nested
+from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
 from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
 from unconstrain.recordings.preparation import Preparation
@@ -133,7 +135,9 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     every = [(file, robot is not None or len(files) > 1) for _, files, robot in located for file in files]
     with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
         formats = iter(list(pool.map(_open_file, every)))
-    opened = [[next(formats) for _ in files] for _, files, _ in located]
+    opened = [
+        _joined(name, [next(formats) for _ in files], preparation.time_axis) for name, files, _ in located
+    ]
     recordings = tuple(
         _recording(own, name, short, stem, number, not several, columns, preparation, robot)
         for number, (own, (name, _, robot), short, stem) in enumerate(
@@ -179,11 +183,22 @@ def _with_kind(recordings: tuple[Recording, ...], given: str | None) -> tuple[Re
 def _open_file(about: tuple[File, bool]) -> Format:
     file, in_folder = about
     opened = recognize(file)
-    if in_folder and not isinstance(opened, Parquet):
+    if in_folder and not isinstance(opened, Parquet | Npy):
         raise DataError(f"{file.shown} is damaged or not a Parquet file; write it again")
     if isinstance(opened, Parquet):
         opened.row_groups  # noqa: B018 - read here, side by side with those of other files
     return opened
+
+
+def _joined(shown: str, formats: list[Format], time_axis: str | None) -> list[Format]:
+    """Make one format of the arrays of a folder, and say which axis is time; other files are read in turn."""
+    arrays = [each for each in formats if isinstance(each, Npy)]
+    joined: list[Format] = [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
+    if time_axis is None:
+        return joined
+    if not all(isinstance(each, Nested) for each in joined):
+        raise DataError(f"{shown}: time_axis= is for arrays in MATLAB, HDF5 and .npy files; leave it out")
+    return [each.with_time_axis(time_axis) for each in joined if isinstance(each, Nested)]
 
 
 def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:
@@ -191,6 +206,11 @@ def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, li
         return [(place.shown, [place], None)]
     robot = lerobot.recognize(place)
     files = list(robot.files if robot else place.parquet_files())
+    arrays = [] if files or robot else list(place.files(Npy.suffixes))
+    if arrays and not belong_together(arrays):
+        return [(file.shown, [file], None) for file in arrays]
+    if arrays:
+        return [(place.shown, arrays, None)]
     if not files:
         where = os.path.join(place.shown, "*.csv")
         raise DataError(
@@ -224,16 +244,19 @@ def _recording(
             )
         columns = _by_rate(columns, robot.assign(columns), preparation)
     header = filled[0].columns()
-    declared = filled[0].declared() if columns.state is None else None
+    declared = _declared(filled[0], columns)
     own = columns
     if declared is not None:
         own = _by_rate(columns, _with_declared(columns, declared), preparation)
-    elif columns.state is None and columns != Columns():
+        if not declared.saved:  # its notes are on what it takes for time
+            notes = declared.notes if columns.time is None else ()
+            declared = replace(declared, notes=tuple(f"{name}: {note}" for note in notes))
+    if columns.state is None and columns != Columns() and (declared is None or not declared.saved):
         raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
     try:
         roles = assign_roles(header, own, declared, preparation, shown)
     except DataError as error:
-        if declared is None or columns != Columns():
+        if declared is None or not declared.saved or columns != Columns():
             raise
         raise DataError(
             f"{shown} is damaged and cannot be read as saved demonstrations ({error!s:.300})"
@@ -252,11 +275,22 @@ def _by_rate(given: Columns, found: Columns, preparation: Preparation) -> Column
     return replace(found, time=given.time) if preparation.rate is not None else found
 
 
+def _declared(file: Format, columns: Columns) -> Declared | None:
+    """Return what a file says of its columns, where that still matters beside what the user says."""
+    try:
+        declared = file.declared()
+    except DataError:
+        if columns.state is None:
+            raise
+        return None
+    return declared if declared is None or columns.state is None or declared.columns.state is None else None
+
+
 def _with_declared(columns: Columns, declared: Declared) -> Columns:
     own = declared.columns
     return replace(
         columns,
-        state=own.state,
+        state=columns.state if own.state is None else own.state,
         action=own.action if columns.action is None else columns.action,
         time=own.time if columns.time is None else columns.time,
         episode=own.episode if columns.episode is None else columns.episode,

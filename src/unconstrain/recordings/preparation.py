@@ -16,7 +16,9 @@ DROPPED = ("missing", "duplicates", "short", "pauses")
 ACTION_KINDS = ("velocity", "target", "increment")
 """What recorded actions may be."""
 
-CHOICES = {"time_unit": tuple(TIME_UNITS), "action_is": ACTION_KINDS}
+TIME_AXES = ("first", "last")
+
+CHOICES = {"time_unit": tuple(TIME_UNITS), "action_is": ACTION_KINDS, "time_axis": TIME_AXES}
 """Options that take one of some words."""
 
 
@@ -57,11 +59,14 @@ class Preparation:
         States and actions are taken relative to their mean over so many seconds (the standard deviation of a Gaussian),
         for movements such as circles about a centre that wanders. Several times shorter than it wanders, and longer
         than a turn takes.
+    time_axis : {"first", "last"}, optional
+        Which axis of a demonstration's arrays is time, in MATLAB, HDF5 and .npy files. By default it is found, which is
+        noted.
 
     Raises
     ------
     DataError
-        A number is not positive and finite, or the time unit is unknown.
+        A number is not positive and finite, or the time unit or axis is unknown.
     """
 
     time_unit: str | None = None
@@ -76,6 +81,7 @@ class Preparation:
     min_duration: float | None = None
     force_threshold: float | None = None
     moving_centre: float | None = None
+    time_axis: str | None = None
 
     def __post_init__(self) -> None:
         for name, words in CHOICES.items():

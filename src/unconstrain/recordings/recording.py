@@ -393,7 +393,10 @@ class Recording:
         prepares = everything or self.whole_episodes_for is not None
         loaded = self._prepare(pieces, start, everything) if prepares else Loaded(self._take(pieces, start))
         guesses: set[bytes] = {
-            metadata[GUESS] for piece in pieces if GUESS in (metadata := piece.rows.schema.metadata or {})
+            guess
+            for piece in pieces
+            if GUESS in (metadata := piece.rows.schema.metadata or {})
+            for guess in metadata[GUESS].splitlines()
         }
         notes = [Note("guess", self.name, guess.decode()) for guess in sorted(guesses)]
         if not prepares and self.roles.time is not None:
@@ -622,11 +625,11 @@ class Recording:
             return resting, ()
         what = f"in {{}} of {SHORTEST:g} s or more below {AT_REST:.0%} of the usual speed"
         if self.preparation.drops("pauses"):
-            text = f"left out {{}} of {{}} {what}"
+            text = f"left out {{}} {what}"
         else:
-            text = f'{{}} of {{}} are at rest, {what}; drop="pauses" leaves them out, or min_speed= slow ones'
-        counts = (int(resting.sum()), len(U), count)
-        return resting, (Note("pause", self.name, text, counts, ("sample", "", "pause")),)
+            text = f'{{}} are at rest, {what}; drop="pauses" leaves them out, or min_speed= slow ones'
+        counts = (int(resting.sum()), count)
+        return resting, (Note("pause", self.name, text, counts, ("sample", "pause")),)
 
     def _counted(self, codes: Codes) -> Array:
         """Return the time (s) of rows without stamps, (N,): their number within the episode by the rate."""

@@ -298,6 +298,7 @@ def open(
     min_duration: float | None = None,
     force_threshold: float | None = None,
     moving_centre: float | None = None,
+    time_axis: str | None = None,
     columns: Columns | None = None,
     preparation: Preparation | None = None,
 ) -> Recordings:
@@ -306,18 +307,18 @@ def open(
     Parameters
     ----------
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
-        A file in CSV, TSV, TXT, NPZ or Parquet; on disk, or at a URI such as ``s3://bucket/file`` that
-        `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording, or
-        a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any iterable of ``(X, U)``,
-        ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
-        None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
-        iterable, which can then be read more than once.
+        A file in CSV, TSV, TXT, NPZ, NPY, MATLAB, HDF5 or Parquet; on disk, or at a URI such as ``s3://bucket/file``
+        that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording,
+        one of .npy arrays, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any
+        iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d),
+        episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not known; or a function
+        that returns such an iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
-    window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
+    window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
@@ -365,7 +366,7 @@ def open(
             "time_unit": time_unit, "rate": rate, "action_is": action_is, "drop": drop, "resample": resample,
             "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
             "min_duration": min_duration, "force_threshold": force_threshold,
-            "moving_centre": moving_centre,
+            "moving_centre": moving_centre, "time_axis": time_axis,
         },
     )  # fmt: skip
     if isinstance(source, Recordings):
@@ -417,7 +418,7 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         Which column is what; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
-    window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre : optional
+    window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.

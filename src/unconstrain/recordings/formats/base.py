@@ -26,7 +26,8 @@ class Declared:
     Parameters
     ----------
     columns : Columns
-        The roles that are taken where the user gives none.
+        The roles that are taken where the user gives none. Without states among them, they are taken beside those
+        that the user gives.
     saved : bool
         Whether this package wrote the file: its episodes are then numbers into `episode_labels`, and the files of a
         folder are recordings by themselves.

@@ -1,0 +1,173 @@
+"""HDF5 files: robomimic, robosuite, ALOHA, and any other whose groups repeat."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.errors import DataError
+from unconstrain.memory import check_memory
+from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.nested import RATES, STEPS, Fetch, Nested
+from unconstrain.recordings.formats.trees import Leaf, Node, Odd
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+BLOCKS = (512, 1024, 2048)
+"""Where in a file HDF5 may begin after a block of the user's."""
+
+MAY_BEGIN_LATER = (".hdf5", ".h5", ".mat")
+"""Suffixes of files that are looked at further than at their beginning, which for others would be a request more."""
+
+ENVIRONMENT = "env_args"
+"""Where robomimic and robosuite say how often a robot was controlled."""
+
+DEEPEST = 32
+"""Groups within groups."""
+
+
+class Hdf5(Nested):
+    """An HDF5 file, of which only the arrays asked for are read, a demonstration at a time.
+
+    Links to other files, and arrays that lie in other files, are not followed.
+
+    Parameters
+    ----------
+    file : File
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".hdf5", ".h5")
+    separator: ClassVar[str] = "/"
+    kind: ClassVar[str] = "an HDF5 file"
+
+    @classmethod
+    def matches(cls, file: File) -> bool:
+        """Whether the content is of this format, as its first bytes tell."""
+        return is_hdf5(file)
+
+    def tree(self) -> dict[str, Node]:
+        """Read which groups and arrays there are."""
+        with self._open() as opened:
+            node = self.node(opened, opened, ())
+        return node if isinstance(node, dict) else {"root": node}
+
+    @contextmanager
+    def opened(self) -> Iterator[Fetch]:
+        """Open the file, and return what reads one of its arrays."""
+        with self._open() as opened:
+
+            def fetch(leaf: Leaf) -> NDArray[Any]:
+                if isinstance(leaf.where, np.ndarray):
+                    return leaf.where
+                if isinstance(leaf.where, tuple):
+                    name, field = leaf.where
+                    return opened[name][field]
+                return self.fetch(opened[leaf.where], leaf.index)
+
+            yield fetch
+
+    def node(self, item: Any, opened: Any, above: tuple[Any, ...]) -> Node:
+        """Read what a dataset or a group stands for."""
+        h5py = _library(self.file.shown)
+        if len(above) > DEEPEST:
+            return Odd(f"lies deeper than {DEEPEST} groups")
+        if isinstance(item, h5py.Dataset):
+            if item.external or item.is_virtual:
+                return Odd("lies in another file")
+            if item.shape is None or not item.size:
+                return Odd("is empty")
+            if item.dtype.names:
+                return self.records(item)
+            if item.dtype.hasobject:
+                return Odd("holds text or references")
+            return self.leaf(item)
+        if not isinstance(item, h5py.Group):
+            return Odd("is a type of data")
+        if item.id in above:
+            return Odd("is a group that contains itself")
+        inner: dict[str, Node] = {}
+        for name in item:
+            if name in ("#refs#", "#subsystem#"):  # where MATLAB keeps what cells refer to
+                continue
+            link = item.get(name, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                inner[name] = Odd("lies in another file")
+                continue
+            if (part := item.get(name)) is None:
+                inner[name] = Odd("is a link to nothing")
+                continue
+            inner[name] = self.node(part, opened, (*above, item.id))
+        for name, number in _steps(item):
+            inner.setdefault(name, Leaf((), number.dtype, number))
+        return inner
+
+    def leaf(self, item: Any) -> Leaf:
+        """Describe an array."""
+        return Leaf(tuple(item.shape), item.dtype, item.name)
+
+    def records(self, item: Any) -> Node:
+        """Describe the fields of an array of records."""
+        fields = {name: item.dtype.fields[name][0] for name in item.dtype.names}
+        return {
+            name: Odd("holds text or references")
+            if kind.hasobject or kind.names
+            else Leaf((*item.shape, *kind.shape), kind.base, (item.name, name))
+            for name, kind in fields.items()
+        }
+
+    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+        """Read an array."""
+        return item[()] if index is None else item[index]
+
+    def check_size(self, item: Any) -> None:
+        """Refuse an array that does not fit into memory."""
+        check_memory(2.0 * item.size * max(item.dtype.itemsize, 64), f"reading {self.file.shown}", "split it")
+
+    @contextmanager
+    def _open(self) -> Iterator[Any]:
+        h5py = _library(self.file.shown)
+        if self.file.local:
+            with h5py.File(self.file.path, "r", locking=False) as opened:
+                yield opened
+            return
+        with self.file.open() as content, h5py.File(content, "r") as opened:
+            yield opened
+
+
+def is_hdf5(file: File) -> bool:
+    """Whether a file holds HDF5, at its beginning or after a block of the user's."""
+    if file.magic.startswith(MAGIC):
+        return True
+    if file.suffix not in MAY_BEGIN_LATER:
+        return False
+    begin = file.begin(BLOCKS[-1] + len(MAGIC))
+    return any(begin[at : at + len(MAGIC)] == MAGIC for at in BLOCKS)
+
+
+def _steps(group: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the attributes of a group that say how far samples are apart."""
+    for name in group.attrs:
+        if name.lower() in STEPS | RATES:
+            number = np.asarray(group.attrs[name])
+            if number.dtype.kind in "iuf" and number.size == 1:
+                yield name, number.reshape(())
+        elif name == ENVIRONMENT:
+            try:
+                rate = float(json.loads(group.attrs[name])["env_kwargs"]["control_freq"])
+            except (ValueError, KeyError, TypeError, RecursionError):
+                continue
+            yield "control_freq", np.array(rate)
+
+
+def _library(shown: str) -> ModuleType:
+    try:
+        import h5py
+    except ImportError:
+        raise DataError(
+            f"{shown}: reading HDF5 needs the package h5py, which is not installed: "
+            "pip install 'unconstrain[hdf5]'"
+        ) from None
+    return h5py

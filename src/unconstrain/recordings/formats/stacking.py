@@ -1,0 +1,205 @@
+"""Arrays of several demonstrations, stacked along time: which axis that is, and what cannot be stacked."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.recordings.formats.trees import WIDEST, Leaf, Odd
+
+Shape = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Stacked:
+    """An array of every demonstration, as columns of one table.
+
+    Parameters
+    ----------
+    parts : tuple of Leaf
+        One a demonstration.
+    axes : tuple of (int or None)
+        Which axis of each is time; None for a scalar, which holds for all samples of its demonstration.
+    width : int
+        Numbers a sample; 0 for an array of one number a sample.
+    kind : numpy.dtype
+        Of all parts.
+    """
+
+    parts: tuple[Leaf, ...]
+    axes: tuple[int | None, ...]
+    width: int
+    kind: np.dtype
+
+    def order(self, which: int) -> str:
+        """Say in which order the axes of a part are; "" where there is but one way to read it."""
+        shape, axis = self.parts[which].shape, self.axes[which]
+        if axis is None or sum(length != 1 for length in shape) < 2:
+            return ""
+        return "time x dimensions" if axis == 0 else "dimensions x time"
+
+    def arrange(self, which: int, array: NDArray) -> NDArray:
+        """Bring a part, or some of its samples, into the shape (T,) or (T, width)."""
+        axis = self.axes[which]
+        rows = np.moveaxis(array, axis or 0, 0)
+        return rows.reshape(len(rows), -1)[:, 0] if not self.width else rows.reshape(len(rows), -1)
+
+
+def find_lengths(
+    demonstrations: Sequence[Mapping[str, Leaf | Odd]], time_axis: str | None = None
+) -> list[int]:
+    """Find how many samples each demonstration has.
+
+    It is the length that most of a demonstration's arrays have an axis of. Where the axes of several lengths are as
+    many, one that differs between demonstrations, and the longest, come first.
+
+    Parameters
+    ----------
+    demonstrations : sequence of mapping of str to Leaf or Odd
+        The arrays by path.
+    time_axis : {"first", "last"}, optional
+        Which axis is time, where that is known.
+
+    Returns
+    -------
+    list of int
+        Zero where a demonstration has no arrays.
+    """
+    lengths_at: dict[tuple[str, int], set[int]] = {}
+    for arrays in demonstrations:
+        for path, axis, length in _axes(arrays, time_axis):
+            lengths_at.setdefault((path, axis), set()).add(length)
+    found = []
+    for arrays in demonstrations:
+        votes = Counter(
+            length for length, _ in {(length, path) for path, _, length in _axes(arrays, time_axis)}
+        )
+        longest = max(votes, default=0)
+        votes[longest] += 1
+        votes.update({n for path, axis, n in _axes(arrays, time_axis) if len(lengths_at[path, axis]) > 1})
+        found.append(max(votes, key=partial(_rank, votes)))
+    return found
+
+
+def stack(
+    demonstrations: Sequence[Mapping[str, Leaf | Odd]],
+    lengths: Sequence[int],
+    labels: Sequence[str | int],
+    time_axis: str | None = None,
+) -> tuple[dict[str, Stacked], dict[str, str]]:
+    """Stack the arrays of demonstrations that fit together.
+
+    Parameters
+    ----------
+    demonstrations : sequence of mapping of str to Leaf or Odd
+        The arrays by path.
+    lengths : sequence of int
+        As `find_lengths` gives them.
+    labels : sequence of (str or int)
+        What a sentence calls each.
+    time_axis : {"first", "last"}, optional
+        Which axis is time, where that is known.
+
+    Returns
+    -------
+    stacked : dict of str to Stacked
+        By path.
+    unusable : dict of str to str
+        Of all other paths, the reason.
+    """
+    leading = _usual_order(demonstrations, lengths) if time_axis is None else time_axis == "first"
+    strict = time_axis is not None
+    stacked: dict[str, Stacked] = {}
+    unusable: dict[str, str] = {}
+    for path in dict.fromkeys(path for arrays in demonstrations for path in arrays):
+        result = _stack_one([arrays.get(path) for arrays in demonstrations], lengths, labels, leading, strict)
+        if isinstance(result, str):
+            unusable[path] = result
+        else:
+            stacked[path] = result
+    return stacked, unusable
+
+
+def _stack_one(
+    nodes: Sequence[Leaf | Odd | None],
+    lengths: Sequence[int],
+    labels: Sequence[str | int],
+    leading: bool,
+    strict: bool,
+) -> Stacked | str:
+    parts: list[Leaf] = []
+    axes: list[int | None] = []
+    widths: dict[int, str | int] = {}
+    for node, length, label in zip(nodes, lengths, labels, strict=True):
+        if node is None:
+            return f"is missing in demonstration {label}"
+        if isinstance(node, Odd):
+            return node.reason if len(nodes) == 1 else f"{node.reason} in demonstration {label}"
+        if node.kind.kind not in "biufUSMm":
+            return f"holds values of type {node.kind}"
+        axis = _time_axis(node.shape, length, leading, strict)
+        if axis is None and node.size != 1:
+            return (
+                f"has shape {node.shape} in demonstration {label}, in which no axis has the {length} samples "
+                "that its arrays share"
+            )
+        width = 1 if axis is None or not length else node.size // length
+        if width > WIDEST:
+            return f"holds {width} numbers a sample, as images do"
+        widths.setdefault(width, label)
+        parts.append(node)
+        axes.append(axis)
+    if len(widths) > 1:
+        (first, one), (second, other) = list(widths.items())[:2]
+        return f"has {first} numbers a sample in demonstration {one} but {second} in {other}"
+    if len({axis is None for axis in axes}) > 1:
+        return "is a single number in some demonstrations and one a sample in others"
+    kinds = {"text" if part.kind.kind in "US" else "number" for part in parts}
+    if len(kinds) > 1:
+        return "holds text in some demonstrations and numbers in others"
+    width = next(iter(widths))
+    kind = np.result_type(*{part.kind for part in parts})
+    return Stacked(tuple(parts), tuple(axes), 0 if width == 1 else width, kind)
+
+
+def _usual_order(demonstrations: Sequence[Mapping[str, Leaf | Odd]], lengths: Sequence[int]) -> bool:
+    """Whether time is mostly the first axis, by which square arrays are read."""
+    first = last = 0
+    for arrays, length in zip(demonstrations, lengths, strict=True):
+        for node in arrays.values():
+            if isinstance(node, Leaf) and len(node.shape) > 1 and node.shape.count(length) == 1:
+                first += node.shape[0] == length
+                last += node.shape[-1] == length
+    return first >= last
+
+
+def _time_axis(shape: Shape, length: int, leading: bool, strict: bool) -> int | None:
+    places = [axis for axis, size in enumerate(shape) if size == length]
+    if strict and sum(size != 1 for size in shape) > 1:
+        places = [axis for axis in places if axis == (0 if leading else len(shape) - 1)]
+    if not places or (length == 1 and int(np.prod(shape, dtype=object)) == 1):
+        return None
+    return places[0] if leading else places[-1]
+
+
+def _rank(votes: Counter[int], length: int) -> tuple[int, int]:
+    return votes[length], length
+
+
+def _axes(arrays: Mapping[str, Leaf | Odd], time_axis: str | None) -> list[tuple[str, int, int]]:
+    """Return by path each axis that may be time, and its length."""
+    return [
+        (path, axis, length)
+        for path, node in arrays.items()
+        if isinstance(node, Leaf) and node.kind.kind in "biuf" and node.numbers
+        for axis, length in enumerate(node.shape)
+        if length > 1
+        and (
+            time_axis is None
+            or node.size == length
+            or axis == (0 if time_axis == "first" else len(node.shape) - 1)
+        )
+    ]

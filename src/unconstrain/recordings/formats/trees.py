@@ -1,0 +1,227 @@
+"""Files that hold a tree of arrays, such as MATLAB and HDF5 files, and where in the tree demonstrations repeat."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Union
+
+import numpy as np
+
+from unconstrain.recordings.files import natural
+
+WIDEST = 1024
+"""Numbers a sample, at most, that become columns; images have more."""
+
+MOST_OF = 0.9
+"""Share of the numbers of a demonstration that its own parts must hold to be the demonstrations instead."""
+
+FEWEST_UNNUMBERED = 3
+"""Groups, at least, that are demonstrations by their content alone, where their names are not numbered."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """An array of a tree.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        As its user sees it.
+    kind : numpy.dtype
+    where : object
+        What finds it in its file, or the array itself.
+    index : int or None
+        Which part of it along its first axis; None for all of it.
+    """
+
+    shape: tuple[int, ...]
+    kind: np.dtype
+    where: Any
+    index: int | None = None
+
+    @property
+    def size(self) -> int:
+        """The number of values."""
+        return int(np.prod(self.shape, dtype=object))
+
+    @property
+    def numbers(self) -> int:
+        """The number of values that may become columns: none of images."""
+        longest = max(self.shape, default=1)
+        return self.size if self.size <= longest * WIDEST else 0
+
+
+@dataclass(frozen=True)
+class Odd:
+    """Something in a tree that is no array.
+
+    Parameters
+    ----------
+    reason : str
+        What it is instead, as in "holds text".
+    """
+
+    reason: str
+
+
+Node = Union[Leaf, Odd, "dict[str, Node]", "list[Node]"]
+"""An array, something else, named parts, or a sequence of alike parts (cells, arrays of structs)."""
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """One demonstration of a file.
+
+    Parameters
+    ----------
+    label : str or int
+        What the file calls it: a name, or a number.
+    content : dict of str to Node
+        Its parts, by name.
+    """
+
+    label: str | int
+    content: dict[str, Node]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Demonstrations, and where they are.
+
+    Parameters
+    ----------
+    path : tuple of str
+        Names that lead to them; empty where the file is one demonstration.
+    names : tuple of str
+        Of the parts that repeat, as a sentence names them, such as "demos".
+    members : tuple of str
+        Of the parts that hold them, as the tree names them.
+    demonstrations : tuple of Demonstration
+        In their natural order: 10 comes after 9.
+    """
+
+    path: tuple[str, ...]
+    names: tuple[str, ...]
+    members: tuple[str, ...]
+    demonstrations: tuple[Demonstration, ...]
+
+
+def find_demonstrations(tree: dict[str, Node]) -> Found:
+    """Find the part of a tree that repeats, with the most numbers.
+
+    What repeats is a list of parts, several lists of one length beside each other, or groups whose names differ by
+    their numbers only. Where nothing does, the whole tree is one demonstration.
+
+    Parameters
+    ----------
+    tree : dict of str to Node
+
+    Returns
+    -------
+    Found
+    """
+    best = max(_candidates(tree, ()), key=lambda found: _numbers(found), default=None)
+    if best is None:
+        return Found((), (), (), (Demonstration(0, tree),))
+    inner = [find_demonstrations(each.content) for each in best.demonstrations]
+    if all(
+        each.names and _numbers(each) > MOST_OF * numbers_in(demo.content)
+        for each, demo in zip(inner, best.demonstrations, strict=True)
+    ):
+        nested = (
+            Demonstration(f"{outer.label}/{demo.label}", demo.content)
+            for outer, each in zip(best.demonstrations, inner, strict=True)
+            for demo in each.demonstrations
+        )
+        return replace(best, demonstrations=tuple(nested))
+    return best
+
+
+def leaves(node: Node, separator: str, path: str = "") -> Iterator[tuple[str, Leaf | Odd]]:
+    """Yield the arrays of a tree, and what else is in it, by path."""
+    if isinstance(node, Leaf | Odd):
+        yield path, node
+        return
+    if isinstance(node, list):
+        yield path, Odd(f"is a sequence of {len(node)} parts, not an array")
+        return
+    for name, inner in node.items():
+        yield from leaves(inner, separator, f"{path}{separator}{name}" if path else name)
+
+
+def outside(tree: Mapping[str, Node], found: Found, separator: str) -> dict[str, Leaf | Odd]:
+    """Return what lies beside the demonstrations of a tree, by path."""
+    if not found.names:
+        return {}
+    beside: dict[str, Leaf | Odd] = {}
+    path: tuple[str, ...] = ()
+    inner: Node = dict(tree)
+    for step in (*found.path, None):
+        assert isinstance(inner, dict)
+        skipped = found.members if step is None else (step,)
+        for name, node in inner.items():
+            if name not in skipped:
+                beside.update(leaves(node, separator, separator.join((*path, name))))
+        if step is not None:
+            inner, path = inner[step], (*path, step)
+    return beside
+
+
+def numbers_in(node: Node) -> int:
+    """Return how many numbers of a tree may become columns."""
+    if isinstance(node, Leaf):
+        return node.numbers
+    if isinstance(node, Odd):
+        return 0
+    return sum(map(numbers_in, node if isinstance(node, list) else node.values()))
+
+
+def _numbers(found: Found) -> int:
+    return sum(numbers_in(each.content) for each in found.demonstrations)
+
+
+def _candidates(tree: Mapping[str, Node], path: tuple[str, ...]) -> Iterator[Found]:
+    """Yield whatever repeats, outer parts first."""
+    yield from _lists(tree, path)
+    yield from _groups(tree, path)
+    for name, node in tree.items():
+        if isinstance(node, dict):
+            yield from _candidates(node, (*path, name))
+
+
+def _lists(tree: Mapping[str, Node], path: tuple[str, ...]) -> Iterator[Found]:
+    lists = {name: node for name, node in tree.items() if isinstance(node, list) and node}
+    for length in dict.fromkeys(map(len, lists.values())):
+        alike = {name: node for name, node in lists.items() if len(node) == length and numbers_in(node)}
+        if not alike:
+            continue
+        demonstrations = []
+        for i in range(length):
+            content: dict[str, Node] = {}
+            for name, node in alike.items():
+                part = node[i]
+                if isinstance(part, dict) and len(alike) == 1:
+                    content |= part
+                else:
+                    content[name] = part
+            if numbers_in(content):
+                demonstrations.append(Demonstration(i + 1, content))
+        empty = length - len(demonstrations)
+        said = f" ({empty} of {length} without numbers left out)" if empty else ""
+        yield Found(path, tuple(f"{name}{said}" for name in alike), tuple(alike), tuple(demonstrations))
+
+
+def _groups(tree: Mapping[str, Node], path: tuple[str, ...]) -> Iterator[Found]:
+    groups = {name: node for name, node in tree.items() if isinstance(node, dict) and numbers_in(node)}
+    stems: dict[str, list[str]] = {}
+    for name in groups:
+        if re.search(r"\d", name):
+            stems.setdefault(re.sub(r"\d+", "#", name), []).append(name)
+    if not stems and len(groups) == len(tree) >= FEWEST_UNNUMBERED:
+        contents = {tuple(sorted(node)) for node in groups.values()}
+        if len(contents) == 1:
+            stems = {"*": list(groups)}
+    for stem, names in stems.items():
+        ordered = sorted(names, key=natural)
+        demonstrations = tuple(Demonstration(name, groups[name]) for name in ordered)
+        yield Found(path, (stem.replace("#", "*"),), tuple(names), demonstrations)

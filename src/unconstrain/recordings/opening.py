@@ -12,8 +12,8 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.batches import FORMS
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
-from unconstrain.recordings.formats import lerobot, recognize
-from unconstrain.recordings.formats.base import Declared, Format
+from unconstrain.recordings.formats import lerobot, recognize, rosbag_reading
+from unconstrain.recordings.formats.base import Declared, Format, HasTopics, narrow
 from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
@@ -130,7 +130,7 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     every = [(file, robot is not None or len(files) > 1) for _, files, robot in located for file in files]
     with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
         formats = iter(list(pool.map(_open_file, every)))
-    opened = [[next(formats) for _ in files] for _, files, _ in located]
+    opened = [[narrow(next(formats), columns.topics) for _ in files] for _, files, _ in located]
     recordings = tuple(
         _recording(own, name, short, stem, number, not several, columns, preparation, robot)
         for number, (own, (name, _, robot), short, stem) in enumerate(
@@ -155,6 +155,8 @@ def _open_file(about: tuple[File, bool]) -> Format:
 def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:
     if isinstance(place, File):
         return [(place.shown, [place], None)]
+    if rosbag_reading.is_bag(place):
+        return [(place.shown, [rosbag_reading.as_file(place)], None)]
     robot = lerobot.recognize(place)
     files = list(robot.files if robot else place.parquet_files())
     if not files:
@@ -190,7 +192,7 @@ def _recording(
             )
         columns = robot.assign(columns)
     header = filled[0].columns()
-    declared = filled[0].declared() if columns.state is None else None
+    declared = filled[0].declared() if columns.state is None or isinstance(filled[0], HasTopics) else None
     own = columns
     if declared is not None:
         own = _with_declared(columns, declared)
@@ -199,7 +201,7 @@ def _recording(
     try:
         roles = assign_roles(header, own, declared, preparation, shown)
     except DataError as error:
-        if declared is None or columns != Columns():
+        if declared is None or not declared.saved or columns != Columns():
             raise
         raise DataError(
             f"{shown} is damaged and cannot be read as saved demonstrations ({error!s:.300})"
@@ -217,7 +219,7 @@ def _with_declared(columns: Columns, declared: Declared) -> Columns:
     own = declared.columns
     return replace(
         columns,
-        state=own.state,
+        state=own.state if columns.state is None else columns.state,
         action=own.action if columns.action is None else columns.action,
         time=own.time if columns.time is None else columns.time,
         episode=own.episode if columns.episode is None else columns.episode,

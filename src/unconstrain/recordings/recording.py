@@ -306,7 +306,11 @@ class Recording:
         guesses: set[bytes] = {
             metadata[GUESS] for piece in pieces if GUESS in (metadata := piece.rows.schema.metadata or {})
         }
-        notes = (Note("guess", self.name, guess.decode()) for guess in sorted(guesses))
+        notes = (
+            Note("guess", self.name, line)
+            for guess in sorted(guesses)
+            for line in guess.decode().splitlines()
+        )
         loaded = replace(loaded, notes=(*notes, *loaded.notes))
         least = self.preparation.min_speed
         if least is not None:

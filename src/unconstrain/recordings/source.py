@@ -1,7 +1,7 @@
 """The one gateway to recordings: `open` finds out what there is, and what it returns reads it."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
@@ -274,6 +274,7 @@ def open(
     force: Keys | None = None,
     free: Key | None = None,
     projections: Keys | None = None,
+    topic: str | Sequence[str] | None = None,
     time_unit: str | None = None,
     window: float | None = None,
     gap: float | None = None,
@@ -289,15 +290,18 @@ def open(
     Parameters
     ----------
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
-        A file in CSV, TSV, TXT, NPZ or Parquet; on disk, or at a URI such as ``s3://bucket/file`` that
-        `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording, or
-        a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any iterable of ``(X, U)``,
+        A file in CSV, TSV, TXT, NPZ or Parquet, or a ROS bag (.bag, .mcap, .db3); on disk, or at a URI such as
+        ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are
+        parts of one recording, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names.
+        Batches are any iterable of ``(X, U)``,
         ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
         None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
         iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
+    topic : str, or list of str, optional
+        Which topics of a ROS bag are read; see `Columns`.
     time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional
@@ -335,7 +339,7 @@ def open(
         Columns,
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
-            "projections": projections,
+            "projections": projections, "topic": topic,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -390,6 +394,8 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         See `open`.
     state, action, time, episode, force, free, projections : column, or list of columns
         Which column is what; see `Columns`.
+    topic : str, or list of str, optional
+        Which topics of a ROS bag are read; see `Columns`.
     time_unit, window, gap, max_speed, min_speed, min_duration, force_threshold : optional
         What is done to the samples; see `Preparation`.
     columns : Columns, optional

@@ -5,10 +5,11 @@ from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import Format
 from unconstrain.recordings.formats.npz import Npz
 from unconstrain.recordings.formats.parquet import Parquet
+from unconstrain.recordings.formats.rosbag import RosBag
 from unconstrain.recordings.formats.saved import Saved
 from unconstrain.recordings.formats.text import Text
 
-FORMATS: tuple[type[Format], ...] = (Parquet, Saved, Npz, Text)
+FORMATS: tuple[type[Format], ...] = (RosBag, Parquet, Saved, Npz, Text)
 """In the order in which they are tried."""
 
 

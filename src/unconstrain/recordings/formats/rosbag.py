@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, printable
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats import rosbag_reading
@@ -137,7 +137,8 @@ class RosBag:
             else to_arrow(table.fields[name].values[start:stop])
             for name in names
         ]
-        guesses = [remark.text for remark in table.remarks if remark.is_due(names)]
+        # Names of frames are a stranger's: no end of a line or escape sequence stays in a note.
+        guesses = [printable(remark.text) for remark in table.remarks if remark.is_due(names)]
         rows = pa.RecordBatch.from_arrays(values, names=names)
         yield start, rows.replace_schema_metadata({GUESS: "\n".join(guesses).encode()}) if guesses else rows
 
@@ -164,6 +165,11 @@ class RosBag:
             tables = [read_topic(bag, topic, self.file.shown) for topic in topics]
             if not bag.defines_messages:
                 notes.append("the bag does not define its messages, which are read as those of ROS 2 Humble")
+        if rosbag_reading.has_log(self.file):
+            notes.append(
+                "messages in the database's log beside the bag (-wal) are not read; open it with sqlite3 once, which "
+                "takes them in"
+            )
         notes += [note for table in tables for note in table.notes]
         stamped = all(table.stamps is not None for table in tables)
         clocks = [_clock(table, stamped) for table in tables]

@@ -156,6 +156,13 @@ def is_bag_file(file: File) -> bool:
     return any(file.magic.startswith(magic) for magic in MAGIC)
 
 
+def has_log(file: File) -> bool:
+    """Whether the program that wrote a bag was stopped before the database took in all messages."""
+    path = Path(file.path)
+    logs = path.parent.glob("*.db3-wal") if path.name == METADATA else [Path(f"{path}-wal")]
+    return file.local and any(log.is_file() and log.stat().st_size > 0 for log in logs)
+
+
 @contextmanager
 def opened(file: File) -> Iterator[Bag]:
     """Open a bag.
@@ -182,7 +189,7 @@ def opened(file: File) -> Iterator[Bag]:
             f"{file.shown} is a ROS bag, and reading it needs the package rosbags, which is not installed: pip install "
             "'unconstrain[ros]'"
         ) from None
-    kind = next((suffix for magic, suffix in MAGIC.items() if file.magic.startswith(magic)), "")
+    kind = _kind(file)
     try:
         # Bags from before ROS 2 Iron do not say what their messages consist of.
         assumed = get_typestore(Stores.ROS2_HUMBLE)
@@ -198,6 +205,14 @@ def opened(file: File) -> Iterator[Bag]:
             f"{file.shown} is damaged, cut short or no ROS bag ({reason:.160}): recover it with `{RECOVERY[kind]}`, or "
             "record it again"
         ) from error
+
+
+def _kind(file: File) -> str:
+    """Return the suffix that belongs to the content, or else the one that there is; none for a folder."""
+    if file.path.endswith(METADATA):
+        return ""
+    own = (suffix for magic, suffix in MAGIC.items() if file.magic.startswith(magic))
+    return next(own, file.suffix)
 
 
 @contextmanager

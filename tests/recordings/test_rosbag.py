@@ -218,6 +218,34 @@ def test_quaternions_and_whole_numbers_are_those_of_the_nearest(tmp_path):
     assert set(demos.states[:, 0]) == {-1.0, 1.0}
 
 
+def test_no_value_is_made_up_where_an_angle_begins_anew(tmp_path):
+    def fill(bag):
+        for i in range(60):
+            turned = (0.1 * i + np.pi) % (2 * np.pi) - np.pi
+            bag.joints("/yaw", START + 0.1 * i, ["yaw"], [turned])
+            bag.stamped_pose("/pose", START + 0.1 * i + 0.03, circle(i))
+
+    demos = uc.load(
+        written(tmp_path, "bag", fill),
+        topic=["/pose", "/yaw"],
+        state="/yaw/position.yaw",
+        action="/pose/pose.position.x",
+    )
+    away = np.exp(1j * demos.states[:, 0]) * np.exp(-1j * (0.1 * np.arange(len(demos)) + 0.03))
+    assert np.abs(np.angle(away)).max() < 0.05
+
+
+def test_the_likeliest_topics_come_first(tmp_path):
+    def fill(bag):
+        two_rates(bag)
+        for i in range(200):
+            bag.grasp("/grasp", START + 0.01 * i, [1, 2, 3], i)
+        bag.transforms("/tf_static", START, tool=(1, 2, 3))
+
+    (file,) = locate(files_of(written(tmp_path, "mcap", fill), "mcap")[1:])
+    assert RosBag(file).topics_of_movement() == ("/pose", "/joints", "/grasp")
+
+
 def test_topics_that_never_meet_are_refused(tmp_path):
     def fill(bag):
         for i in range(20):

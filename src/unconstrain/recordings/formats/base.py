@@ -111,6 +111,10 @@ class Format(Protocol):
 class HasTopics(Protocol):
     """What a format does too whose files hold several tables, of which the user names some: topics of a bag."""
 
+    def topics_of_movement(self) -> tuple[str, ...]:
+        """Return the topics that may hold a movement, the likeliest first."""
+        ...
+
     def for_topics(self, topics: tuple[str, ...]) -> Format:
         """Return the same file, of which nothing but these topics is read; with none, those that it chooses itself.
 

@@ -87,6 +87,12 @@ class RosBag:
         """Whether the content is of this format, as its first bytes tell."""
         return rosbag_reading.is_bag_file(file)
 
+    def topics_of_movement(self) -> tuple[str, ...]:
+        """Return the topics that may hold a movement: those of poses and joints first, then by number of messages."""
+        with rosbag_reading.opened(self.file) as bag:
+            topics = [topic for topic in bag.topics() if topic.may_move]
+        return tuple(topic.name for topic in sorted(topics, key=lambda topic: topic.rank))
+
     def for_topics(self, topics: tuple[str, ...]) -> "RosBag":
         """Return the same bag, of which these topics are read."""
         return RosBag(self.file, topics)
@@ -204,9 +210,9 @@ class RosBag:
         more = len(every) - MOST_LISTED
         listing += f" and {more} more" if more > 0 else ""
         if not self.topics:
-            measured = [topic for topic in every.values() if topic.has_numbers]
+            measured = [topic for topic in every.values() if topic.may_move]
             if len(measured) != 1:
-                which = "none of its topics has messages with numbers" if not measured else "give topic="
+                which = "none of its topics has two messages with numbers" if not measured else "give topic="
                 rest = "its topics are" if not measured else "the topic or topics to read; there are"
                 raise DataError(f"{shown}: {which}, {rest} {listing}")
             note = f"topic {measured[0].name} is read, the only one with numbers; topic= names another"

@@ -10,6 +10,9 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.formats.rosbag_messages import Nanoseconds, TopicTable, Values
 from unconstrain.recordings.gaps import GAP_STEPS
 
+TURNS = (2 * np.pi, 360.0)
+"""What is added to or taken from an angle where it begins anew."""
+
 
 @dataclass(frozen=True)
 class Aligned:
@@ -33,8 +36,9 @@ def align(tables: Sequence[TopicTable], times: Sequence[Nanoseconds], shown: str
     """Bring topics to the stamps of the first.
 
     Between two messages of another topic real numbers are interpolated linearly; whole numbers, truth values, text and
-    quaternions are those of the nearer message. A row that lies outside of another topic, or between two of its
-    messages further apart than `GAP_STEPS` times their median step, is left out.
+    quaternions, and numbers that step by more than half a turn as angles do, are those of the nearer message. A row
+    that lies outside of another topic, or between two of its messages further apart than `GAP_STEPS` times their median
+    step, is left out.
 
     Parameters
     ----------
@@ -113,10 +117,21 @@ def _between(each: Values, at: Nanoseconds, own: Nanoseconds, used: NDArray[np.i
     share = (at - own[before]) / length
     if each.by_nearest:
         return Values(values[np.where(share > 0.5, after, before)], each.names, True)
+    nearest = np.where((share > 0.5).reshape(-1, *[1] * (values.ndim - 1)), values[after], values[before])
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     mixed = (1.0 - share) * values[before] + share * values[after]
+    mixed = np.where(_turned(values[after] - values[before], values), nearest, mixed)
     # A message that is not finite says nothing of rows that lie exactly on its neighbour.
     return Values(np.where(share == 0.0, values[before], mixed), each.names)
+
+
+def _turned(steps: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether a step may be that of an angle that begins anew, between whose ends there is no value."""
+    span = np.ptp(values, axis=0)
+    turned = np.zeros(steps.shape, dtype=bool)
+    for turn in TURNS:
+        turned |= (np.abs(steps) > turn / 2) & (span <= turn * (1 + 1e-6))
+    return turned
 
 
 def _taken(each: Values, rows: NDArray[np.int64]) -> Values:

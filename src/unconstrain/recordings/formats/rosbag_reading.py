@@ -37,6 +37,15 @@ TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 TRANSFORM = "geometry_msgs/msg/TransformStamped"
 
+MOVEMENTS = (
+    "geometry_msgs/msg/PoseStamped",
+    "nav_msgs/msg/Odometry",
+    "sensor_msgs/msg/JointState",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/Pose",
+)
+"""Types of messages that are made to show a movement."""
+
 Definitions = Mapping[str, tuple[Any, Any]]
 """By message type, its constants and its fields, as `rosbags` has them."""
 
@@ -62,6 +71,17 @@ class Topic:
     n_messages: int
     has_numbers: bool
     frame: str = ""
+
+    @property
+    def may_move(self) -> bool:
+        """Whether its messages may show a movement."""
+        return self.has_numbers and self.n_messages > 1
+
+    @property
+    def rank(self) -> tuple[int, int]:
+        """Sort key by which topics that are made to show a movement come first, and then those of many messages."""
+        likely = MOVEMENTS.index(self.kind) if self.kind in MOVEMENTS else len(MOVEMENTS)
+        return likely, -self.n_messages
 
     def __str__(self) -> str:
         """Return the topic as a sentence lists it."""
@@ -200,6 +220,11 @@ def opened(file: File) -> Iterator[Bag]:
     except (FileNotFoundError, PermissionError) as error:
         raise DataError(f"{file.shown} cannot be read: {error.strerror or error}") from error
     except Exception as error:  # a reader of foreign files raises anything
+        if "Profile is not ros2" in str(error):
+            raise DataError(
+                f"{file.shown} is an MCAP file, but not of ROS 2, whose messages alone can be read: write it as CSV or "
+                "Parquet"
+            ) from error
         reason = " ".join((str(error) or type(error).__name__).split()).rstrip(".")
         raise DataError(
             f"{file.shown} is damaged, cut short or no ROS bag ({reason:.160}): recover it with `{RECOVERY[kind]}`, or "

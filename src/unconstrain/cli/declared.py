@@ -58,6 +58,21 @@ class ColumnName(ColumnNames):
         return column
 
 
+class Names(click.ParamType):
+    """Names of other things than columns, separated by commas as in a CSV file."""
+
+    name = "names"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> list[str]:
+        """Parse the text; an empty name is a mistake."""
+        if isinstance(value, list):
+            return value
+        names = [name.strip() for row in csv.reader([value], skipinitialspace=True) for name in row]
+        if not names or not all(names):
+            self.fail(f"{value!r} has an empty name: separate names by single commas", param, ctx)
+        return names
+
+
 class Number(click.ParamType):
     """A finite number above zero, or where `zero` is true, not below it; or one of some words.
 
@@ -133,7 +148,8 @@ def declared_options(*declarations: type, section: str) -> list[Callable]:
     ----------
     *declarations : dataclass
         Their docstrings describe their fields under Parameters, as numpydoc has it. A field may hold a column or
-        columns, a number, a truth value, text, or one of the choices that its description lists in braces.
+        columns, a number, a truth value, text, several texts, or one of the choices that its description lists in
+        braces.
     section : str
         Of the help.
 
@@ -163,11 +179,21 @@ def _type_of(annotation: Any, kind: str) -> dict[str, Any]:
     held = set(get_args(annotation)) - {type(None)} or {annotation}
     if int in held and str in held:
         return {"type": ColumnNames() if len(held) > 2 else ColumnName()}
+    if str in held and len(held) > 1:
+        return {"type": Names(), "multiple": True, "callback": _one_list}
     if float in held:
         return {"type": Number()}
     if bool in held:
         return {"is_flag": True}
     return {"type": click.Choice(re.findall(r'"([^"]*)"', kind)) if "{" in kind else str}
+
+
+def _one_list(
+    context: click.Context, parameter: click.Parameter, values: Sequence[list[str]]
+) -> str | list[str] | None:
+    """Join what an option was given each time; one name stands by itself."""
+    names = [name for each in values for name in each]
+    return names if len(names) > 1 else names[0] if names else None
 
 
 def gathered(

@@ -45,10 +45,14 @@ class Columns:
     angle : column, or list of columns
         The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default
         angles, and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
-
     relative_to : "start", "goal", or list of columns
         What states are relative to: where each episode starts, or ends; or as many columns as there are states, such as
         an object's position. Given actions are made relative to columns that move as well, which needs `time`.
+    topic : str, or list of str
+        For ROS bags: the topic whose messages are the samples, and whose fields are the columns. With several, columns
+        are called `/topic/field`, and the others are aligned to the stamps of the first. By default the only topic with
+        numbers.
+
 
     Raises
     ------
@@ -66,6 +70,7 @@ class Columns:
     projections: Keys | None = None
     relative_to: Keys | None = None
     angle: Keys | None = None
+    topic: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for name in ("state", "action", "force", "projections", "relative_to", "angle"):
@@ -87,11 +92,22 @@ class Columns:
             if not isinstance(key, str | Integral | None):
                 shown = " ".join(repr(key).split())
                 raise DataError(f"{name} takes a column's name or position counted from 0, got {shown:.60}")
+        topics = [] if self.topic is None else list(self.topics)
+        if self.topic is not None and not (topics and all(isinstance(each, str) and each for each in topics)):
+            shown = " ".join(repr(self.topic).split())
+            raise DataError(f"topic takes the name of a topic or a list of them, got {shown:.60}")
         if self.projections is not None and not (self.force is self.free is None):
             other = "force" if self.force is not None else "free"
             raise DataError(
                 f"projections= and {other}= both say what the constraints are: leave out one of them"
             )
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics, none where they are not given."""
+        if self.topic is None:
+            return ()
+        return (self.topic,) if isinstance(self.topic, str) else tuple(self.topic)
 
     @property
     def differentiated(self) -> bool:

@@ -13,8 +13,8 @@ from unconstrain.recordings.actions import ActionKind
 from unconstrain.recordings.batches import FORMS
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
-from unconstrain.recordings.formats import lerobot, recognize
-from unconstrain.recordings.formats.base import Declared, Format
+from unconstrain.recordings.formats import lerobot, recognize, rosbag_reading
+from unconstrain.recordings.formats.base import Declared, Format, narrow
 from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.nested import Nested
 from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
@@ -136,7 +136,8 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
         formats = iter(list(pool.map(_open_file, every)))
     opened = [
-        _joined(name, [next(formats) for _ in files], preparation.time_axis) for name, files, _ in located
+        _joined(name, [narrow(next(formats), columns.topics) for _ in files], preparation.time_axis)
+        for name, files, _ in located
     ]
     recordings = tuple(
         _recording(own, name, short, stem, number, not several, columns, preparation, robot)
@@ -204,6 +205,8 @@ def _joined(shown: str, formats: list[Format], time_axis: str | None) -> list[Fo
 def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:
     if isinstance(place, File):
         return [(place.shown, [place], None)]
+    if rosbag_reading.is_bag(place):
+        return [(place.shown, [rosbag_reading.as_file(place)], None)]
     robot = lerobot.recognize(place)
     files = list(robot.files if robot else place.parquet_files())
     arrays = [] if files or robot else list(place.files(Npy.suffixes))
@@ -251,7 +254,7 @@ def _recording(
         if not declared.saved:  # its notes are on what it takes for time
             notes = declared.notes if columns.time is None else ()
             declared = replace(declared, notes=tuple(f"{name}: {note}" for note in notes))
-    if columns.state is None and columns != Columns() and (declared is None or not declared.saved):
+    if columns.state is None and columns != Columns(topic=columns.topic) and (declared is None or not declared.saved):
         raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
     try:
         roles = assign_roles(header, own, declared, preparation, shown)

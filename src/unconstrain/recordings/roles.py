@@ -210,7 +210,6 @@ def is_named(names: Sequence[str]) -> bool:
 
 
 def _names(header: Header, fields: Sequence[Field], letter: str) -> tuple[str, ...]:
-    names = [
-        field.column if field.component is None else f"{field.column}[{field.component}]" for field in fields
-    ]
+    called = {(each.part_of or each.name, each.nth, each.component): each.name for each in header.columns}
+    names = [called[field.column, field.nth, field.component] for field in fields]
     return tuple(name or f"{letter}{i}" for i, name in enumerate(names, start=1))

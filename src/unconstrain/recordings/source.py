@@ -286,6 +286,7 @@ def open(
     projections: Keys | None = None,
     relative_to: Keys | None = None,
     angle: Keys | None = None,
+    topic: str | Sequence[str] | None = None,
     time_unit: str | None = None,
     rate: float | None = None,
     action_is: str | None = None,
@@ -307,15 +308,17 @@ def open(
     Parameters
     ----------
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
-        A file in CSV, TSV, TXT, NPZ, NPY, MATLAB, HDF5 or Parquet; on disk, or at a URI such as ``s3://bucket/file``
-        that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording,
-        one of .npy arrays, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. Batches are any
-        iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d),
-        episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not known; or a function
-        that returns such an iterable, which can then be read more than once.
+        A file in CSV, TSV, TXT, NPZ, NPY, MATLAB, HDF5 or Parquet, or a ROS bag; on disk, or at a URI such as
+        ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are
+        parts of one recording, one of .npy arrays, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns
+        have known names. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups,
+        projections)``: states (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where
+        a constraint is not known; or a function that returns such an iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
+    topic : str, or list of str, optional
+        Which topics of a ROS bag are read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
@@ -355,7 +358,7 @@ def open(
         Columns,
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
-            "projections": projections, "relative_to": relative_to, "angle": angle,
+            "projections": projections, "relative_to": relative_to, "angle": angle, "topic": topic,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -416,6 +419,8 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         See `open`.
     state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
         Which column is what; see `Columns`.
+    topic : str, or list of str, optional
+        Which topics of a ROS bag are read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional

@@ -8,10 +8,11 @@ from unconstrain.recordings.formats.matlab import Matlab, Matlab73
 from unconstrain.recordings.formats.npy import Npy
 from unconstrain.recordings.formats.npz import Npz
 from unconstrain.recordings.formats.parquet import Parquet
+from unconstrain.recordings.formats.rosbag import RosBag
 from unconstrain.recordings.formats.saved import Saved
 from unconstrain.recordings.formats.text import Text
 
-FORMATS: tuple[type[Format], ...] = (Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Npz, Text)
+FORMATS: tuple[type[Format], ...] = (RosBag, Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Npz, Text)
 """In the order in which they are tried."""
 
 

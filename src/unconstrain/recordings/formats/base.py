@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import pyarrow as pa
 
@@ -16,7 +16,7 @@ ColumnKey = tuple[str, int]
 """A column's name, and which of the columns of that name it is, from 0."""
 
 GUESS = b"guess"
-"""Where, in the schema's metadata of the rows that it reads, a format says what it guessed of them."""
+"""Where, in the schema's metadata of the rows that it reads, a format says what it guessed of them, a line each."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +106,47 @@ class Format(Protocol):
     def identity(self) -> str:
         """Say what tells the content from that of other files."""
         ...
+
+
+@runtime_checkable
+class HasTopics(Protocol):
+    """What a format does too whose files hold several tables, of which the user names some: topics of a bag."""
+
+    def topics_of_movement(self) -> tuple[str, ...]:
+        """Return the topics that may hold a movement, the likeliest first."""
+        ...
+
+    def for_topics(self, topics: tuple[str, ...]) -> Format:
+        """Return the same file, of which nothing but these topics is read; with none, those that it chooses itself.
+
+        Nothing is read yet: that a topic is not there, `columns` says.
+        """
+        ...
+
+
+def narrow(opened: Format, topics: tuple[str, ...]) -> Format:
+    """Return a file of which these topics are read.
+
+    Parameters
+    ----------
+    opened : Format
+    topics : tuple of str
+        None of them for a file as it is.
+
+    Returns
+    -------
+    Format
+
+    Raises
+    ------
+    DataError
+        Topics are given, and files of this format have none.
+    """
+    if not topics:
+        return opened
+    if not isinstance(opened, HasTopics):
+        raise DataError(f"{opened.file.shown} has no topics, as only ROS bags have: leave out topic=")
+    return opened.for_topics(topics)
 
 
 @contextmanager

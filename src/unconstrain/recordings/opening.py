@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 from itertools import chain
+from typing import Any
 
 from unconstrain import demonstrations_file
 from unconstrain.demonstrations import Demonstrations
@@ -14,6 +15,7 @@ from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
 from unconstrain.recordings.formats import lerobot, recognize
 from unconstrain.recordings.formats.base import Declared, Format
+from unconstrain.recordings.formats.frame import Frame, is_frame
 from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
@@ -45,6 +47,12 @@ def tell_apart(
             f"source must be a path or several, demonstrations, or an iterable of {FORMS}, got {source!r:.80}"
         )
     return [], source
+
+
+def find_frames(source: Any) -> list[Any]:
+    """Return the data frames that a source is; none where it is something else."""
+    each = list(source) if isinstance(source, list | tuple) else [source]
+    return each if each and all(map(is_frame, each)) else []
 
 
 def check_plain(columns: Columns, preparation: Preparation) -> None:
@@ -98,6 +106,38 @@ def open_demonstrations(demos: Demonstrations, columns: Columns, preparation: Pr
     about = demonstrations_file.describe(demos, {name: name for name in arrays})
     held = InMemory(arrays, about)
     return Tables((_recording([held], "these demonstrations", "", "", 0, True, columns, preparation, None),))
+
+
+def open_frames(frames: Sequence[Any], columns: Columns, preparation: Preparation) -> Tables:
+    """Open data frames in memory as if each lay in a file.
+
+    Parameters
+    ----------
+    frames : sequence of pandas, Polars or Arrow tables
+    columns : Columns
+        As given.
+    preparation : Preparation
+        As given.
+
+    Returns
+    -------
+    Tables
+        A recording each.
+
+    Raises
+    ------
+    DataError
+        There are no such columns, or they cannot be used.
+    """
+    several = len(frames) > 1
+    names = [f"frame {number}" if several else "this frame" for number in range(len(frames))]
+    recordings = tuple(
+        _recording([Frame(frame, name)], name, name, name, number, not several, columns, preparation, None)
+        for number, (frame, name) in enumerate(zip(frames, names, strict=True))
+    )
+    tables = Tables(recordings)
+    tables.check_alike()
+    return tables
 
 
 def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparation: Preparation) -> Tables:

@@ -303,10 +303,11 @@ class Recording:
     def _load(self, pieces: Sequence[Piece], start: int, everything: bool) -> Loaded:
         prepares = everything or self.whole_episodes_for is not None
         loaded = self._prepare(pieces, start, everything) if prepares else Loaded(self._take(pieces, start))
-        guesses: set[bytes] = {
-            metadata[GUESS] for piece in pieces if GUESS in (metadata := piece.rows.schema.metadata or {})
-        }
-        notes = (Note("guess", self.name, guess.decode()) for guess in sorted(guesses))
+        guesses: dict[bytes, None] = {}
+        for piece in pieces:
+            said = (piece.rows.schema.metadata or {}).get(GUESS, b"")
+            guesses |= dict.fromkeys(guess for guess in said.split(b"\n") if guess)
+        notes = (Note("guess", self.name, guess.decode()) for guess in guesses)
         loaded = replace(loaded, notes=(*notes, *loaded.notes))
         least = self.preparation.min_speed
         if least is not None:

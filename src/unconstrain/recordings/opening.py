@@ -44,7 +44,8 @@ def tell_apart(
         return [], chain([first], source) if first is not None else iter(())
     if not callable(source) and not isinstance(source, Iterable):
         raise DataError(
-            f"source must be a path or several, demonstrations, or an iterable of {FORMS}, got {source!r:.80}"
+            f"source must be a path or several, demonstrations, data frames, or an iterable of {FORMS}, "
+            f"got {source!r:.80}"
         )
     return [], source
 

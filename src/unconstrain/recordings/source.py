@@ -15,7 +15,14 @@ from unconstrain.recordings.batches import Batches
 from unconstrain.recordings.blocks import Loaded, Source
 from unconstrain.recordings.columns import Columns, Key, Keys
 from unconstrain.recordings.notes import Note, add_up, combine
-from unconstrain.recordings.opening import check_plain, find_frames, open_demonstrations, open_files, open_frames, tell_apart
+from unconstrain.recordings.opening import (
+    check_plain,
+    find_frames,
+    open_demonstrations,
+    open_files,
+    open_frames,
+    tell_apart,
+)
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.tables import Tables
@@ -292,8 +299,8 @@ def open(
         A file of text (CSV and the like under any suffix, also compressed; exports of Vicon, Motive and OpenSim), JSON
         Lines, XLSX, C3D, NPZ or Parquet; on disk, or at a URI such as ``s3://bucket/file`` that
         `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are parts of one recording, or
-        a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. A data frame of pandas or Polars, or an Arrow table,
-        is a recording, and so is each of several. Batches are any iterable of ``(X, U)``,
+        a LeRobot dataset (2.0, 2.1, 3.0), whose columns have known names. A data frame of pandas or Polars, or an
+        Arrow table, is a recording, and so is each of several. Batches are any iterable of ``(X, U)``,
         ``(X, U, groups)`` or ``(X, U, groups, projections)``: states (N, n), actions (N, d), episode labels (N,) or
         None, and projections (N, d, d), NaN where a constraint is not known; or a function that returns such an
         iterable, which can then be read more than once.

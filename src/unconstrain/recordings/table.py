@@ -160,7 +160,9 @@ class Header:
                 f"(counted from 0); choose for {role}= by position instead, such as {positions[0]}"
             )
         positions = positions or [i for i, column in enumerate(self.columns) if column.part_of == name]
-        positions = positions or [i for i, column in enumerate(self.columns) if column.name.startswith(f"{name}.")]
+        positions = positions or [
+            i for i, column in enumerate(self.columns) if column.name.startswith(f"{name}.")
+        ]
         if positions:
             return positions
         if name in self.unusable:

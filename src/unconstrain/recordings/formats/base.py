@@ -16,7 +16,8 @@ ColumnKey = tuple[str, int]
 """A column's name, and which of the columns of that name it is, from 0."""
 
 GUESS = b"guess"
-"""Where, in the schema's metadata of the rows that it reads, a format says what it guessed of them: one sentence a line."""
+"""Where, in the schema's metadata of the rows that it reads, a format says what it guessed of them,
+one sentence a line."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class C3D(Tabular):
             ) from None
         shown = self.file.shown
         with damage_named(shown, "a C3D file"):
-            _check_header(self.file)
+            promised = _check_header(self.file)
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(self.file.path)
                 if not self.file.local:
@@ -57,6 +57,8 @@ class C3D(Tabular):
             n_channels = int(held["header"]["analogs"]["size"])
             n_points, n_frames = points.shape[1:]
             names = _names(about, n_points)
+        if n_frames < promised:
+            raise DataError(f"{shown} is damaged: it has {n_frames} frames of {promised}; export it again")
         if not n_points or not n_frames:
             raise DataError(f"{shown} holds no points, so there is nothing to learn from")
         if not rate > 0:
@@ -78,7 +80,9 @@ class C3D(Tabular):
 
 def _names(about: Any, n_points: int) -> list[str]:
     """Return the names of points, which do not repeat; more than 255 of them have lists of their own."""
-    lists = [about[key]["value"] for key in ("LABELS", *(f"LABELS{i}" for i in range(2, 300))) if key in about]
+    lists = [
+        about[key]["value"] for key in ("LABELS", *(f"LABELS{i}" for i in range(2, 300))) if key in about
+    ]
     given = [str(name).strip() for each in lists for name in each][:n_points]
     given += [""] * (n_points - len(given))
     names: list[str] = []
@@ -88,11 +92,12 @@ def _names(about: Any, n_points: int) -> list[str]:
     return names
 
 
-def _check_header(file: File) -> None:
-    """Check the sizes that the header promises before a reader makes room for them."""
+def _check_header(file: File) -> int:
+    """Check the sizes that the header promises before a reader makes room for them; return the number of frames."""
     head = file.begin(512)
     n_points, n_values, first, last = struct.unpack("<4H", head[2:10])
     n_frames = max(last - first + 1, 0)
     check_memory(
         16.0 * n_frames * (n_points * 4 + n_values), f"reading {file.shown}", "export fewer frames or markers"
     )
+    return n_frames

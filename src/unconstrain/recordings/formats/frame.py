@@ -56,12 +56,10 @@ def is_frame(source: Any) -> bool:
 
 def _to_arrow(frame: Any, shown: str) -> Any:
     try:
-        if type(frame).__module__.split(".")[0] == "pandas":
-            table = pa.Table.from_pandas(frame)
-        else:
-            table = pa.table(frame)
+        of_pandas = type(frame).__module__.split(".")[0] == "pandas"
+        table = pa.Table.from_pandas(frame) if of_pandas else pa.table(frame)
     except (pa.ArrowException, TypeError, ValueError, AttributeError) as error:
-        reason = (str(error).splitlines() or ["?"])[0]
+        reason = " ".join(" ".join(map(str, error.args)).split())
         raise DataError(f"{shown} cannot be read as a table ({reason:.200}); give a data frame") from error
     names = table.column_names
     if INDEX in names and "index" not in names:

@@ -52,8 +52,15 @@ class JsonLines(Tabular):
             if text.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"[":
                 check_memory(30.0 * len(text), f"reading {self.file.shown}", "write it as Parquet")
                 return pa.Table.from_pylist(json.loads(text.decode("utf-8-sig"))), notes
-            table = pyarrow.json.read_json(
-                pa.BufferReader(text.removeprefix(b"\xef\xbb\xbf")),
-                read_options=pyarrow.json.ReadOptions(block_size=LONGEST_LINE),
-            )
+            try:
+                table = pyarrow.json.read_json(
+                    pa.BufferReader(text.removeprefix(b"\xef\xbb\xbf")),
+                    read_options=pyarrow.json.ReadOptions(block_size=LONGEST_LINE),
+                )
+            except pa.ArrowInvalid as error:
+                reason = " ".join(str(error).split())
+                raise DataError(
+                    f"{self.file.shown} cannot be read as JSON Lines ({reason:.200}); write one object a line, with "
+                    "members of the same types"
+                ) from error
         return table, notes

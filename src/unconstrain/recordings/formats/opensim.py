@@ -60,5 +60,11 @@ def find_storage(lines: Sequence[str]) -> Layout | None:
     unit = words.get(said.get("indegrees", ""))
     notes = (f"angles are in {unit}, as the header says, and not converted",) if unit else ()
     return Layout(
-        delimiter, len(names), tuple(names), tuple(range(len(names))), at + 1, notes, is_padded=delimiter == "\t"
+        delimiter,
+        len(names),
+        tuple(names),
+        tuple(range(len(names))),
+        at + 1,
+        notes,
+        is_padded=delimiter == "\t",
     )

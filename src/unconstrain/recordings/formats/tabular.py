@@ -61,7 +61,9 @@ class Tabular:
         for name, nth in columns:
             where = [i for i, other in enumerate(table.column_names) if other == name]
             if nth >= len(where):
-                raise DataError(f"{self.file.shown} has no column {name!r}; leave it out, or choose other columns")
+                raise DataError(
+                    f"{self.file.shown} has no column {name!r}; leave it out, or choose other columns"
+                )
             column = table.column(where[nth]).slice(start, None if stop is None else stop - start)
             arrays.append(_as_one(column))
         about = {GUESS: "\n".join(notes)} if notes else None

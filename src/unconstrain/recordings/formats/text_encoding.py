@@ -159,14 +159,17 @@ def _decompress(file: File, codec: str, size: int | None = None) -> bytes:
     """Return all that is compressed, or its first `size` bytes."""
     pieces: list[bytes] = []
     length = 0
-    with damage_named(file.shown, f"compressed with {codec}"):
-        with file.open() as opened, pa.CompressedInputStream(opened, codec) as stream:
-            while size is None or length < size:
-                piece = stream.read(PIECE if size is None else size - length)
-                if not piece:
-                    break
-                pieces.append(piece)
-                length += len(piece)
-                # A small file may hold far more than the memory does.
-                check_memory(3.0 * length, f"reading {file.shown}", INSTEAD)
+    with (
+        damage_named(file.shown, f"compressed with {codec}"),
+        file.open() as opened,
+        pa.CompressedInputStream(opened, codec) as stream,
+    ):
+        while size is None or length < size:
+            piece = stream.read(PIECE if size is None else size - length)
+            if not piece:
+                break
+            pieces.append(piece)
+            length += len(piece)
+            # A small file may hold far more than the memory does.
+            check_memory(3.0 * length, f"reading {file.shown}", INSTEAD)
     return b"".join(pieces)

@@ -4,7 +4,7 @@ import csv
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.formats.text_encoding import BOM
@@ -207,13 +207,15 @@ def _find_begin(lines: list[str], delimiter: str, given: bool) -> tuple[str, int
     best = (0, 0, delimiter, 0)
     for mark in [delimiter] if given else ["\t", ";", ",", " "]:
         rows = [split_line(line, mark) for line in lines]
-        width = len(rows[-1])
-        if width < 2 or not any(map(_is_number, rows[-1])):
+        lengths = [len(row) for row in rows]
+        width = max(set(lengths), key=lambda length: (lengths.count(length), length))
+        alike = [row for row in rows if len(row) == width]
+        if width < 2 or not any(map(_is_number, alike[-1])):
             continue
-        if mark == " " and not all(_is_number(cell) or FLAG.fullmatch(cell) for cell in rows[-1]):
+        if mark == " " and not all(_is_number(cell) or FLAG.fullmatch(cell) for cell in alike[-1]):
             continue
-        begin = len(rows) - next((i for i, row in enumerate(rows[::-1]) if len(row) != width), len(rows))
-        if begin and not rows[-1][-1].strip() and len(rows[begin - 1]) == width - 1:
+        begin = next((i for i, both in enumerate(pairwise(lengths)) if both == (width, width)), 0)
+        if begin and not alike[-1][-1].strip() and len(rows[begin - 1]) == width - 1:
             begin -= 1  # lines end with a separator, the header does not
         if begin and len(rows[begin - 1]) == width + 1 and not rows[begin - 1][-1].strip():
             begin -= 1  # the other way round
@@ -222,7 +224,7 @@ def _find_begin(lines: list[str], delimiter: str, given: bool) -> tuple[str, int
             continue  # samples of another length, which is a mistake to be told
         if before and len(before[-1]) > 1 and not _is_header(rows[begin:]):
             continue
-        best = max(best, (len(rows) - begin, width, mark, begin), key=lambda found: found[:2])
+        best = max(best, (len(alike), width, mark, begin), key=lambda found: found[:2])
     length, _, mark, begin = best
     return (mark, begin) if length > 1 else (delimiter, 0)
 
@@ -273,7 +275,9 @@ def _is_header(rows: list[list[str]]) -> bool:
     # A word above numbers is a name, and so are the years beside it.
     words = [i for i, cell in enumerate(first) if cell and not _is_number(cell)]
     below = [row for row in rows[1:] if len(row) == len(first)]
-    return _are_years(numeric) and any(all(_is_number(row[i]) for row in below) for i in words) and bool(below)
+    return (
+        _are_years(numeric) and any(all(_is_number(row[i]) for row in below) for i in words) and bool(below)
+    )
 
 
 def _is_numbered_header(rows: list[list[str]]) -> bool:
@@ -290,7 +294,7 @@ def _is_numbered_header(rows: list[list[str]]) -> bool:
 def _are_years(cells: list[str]) -> bool:
     if not all(cell.isdecimal() and len(cell) == 4 and int(cell) in YEARS for cell in cells):
         return False
-    steps = {int(b) - int(a) for a, b in zip(cells[:-1], cells[1:], strict=True)}
+    steps = {int(b) - int(a) for a, b in pairwise(cells)}
     return len(steps) < 2 and 0 not in steps
 
 

@@ -113,9 +113,7 @@ def _fill(line: bytes, width: int, delimiter: bytes) -> bytes:
     return bare + delimiter * max(width - 1 - bare.count(delimiter), 0)
 
 
-def _time(
-    layout: Layout, read: dict[int, pa.Array], shown: str, place: Callable[[int], str]
-) -> pa.Array:
+def _time(layout: Layout, read: dict[int, pa.Array], shown: str, place: Callable[[int], str]) -> pa.Array:
     """Return the time (s) of rows that are numbered, zero at the first frame there could be."""
     made = layout.time
     assert made is not None
@@ -136,9 +134,7 @@ def _without_commas(column: pa.Array, where: str, called: str, guesses: dict[str
         column = pc.replace_substring_regex(column, r"(\d)\.(\d{3})", r"\1\2")
         guesses[POINTS_TOO] = None
         return pc.replace_substring_regex(column, DECIMAL_COMMA, r"\1.\2")
-    numbers = with_comma.filter(
-        pc.or_(_matches(with_comma, DECIMAL_COMMA), _matches(with_comma, THOUSANDS))
-    )
+    numbers = with_comma.filter(pc.or_(_matches(with_comma, DECIMAL_COMMA), _matches(with_comma, THOUSANDS)))
     if not len(numbers):
         return column
     is_decimal = not pc.all(_matches(numbers, THOUSANDS)).as_py()

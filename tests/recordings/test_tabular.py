@@ -32,6 +32,12 @@ def test_frames(convert):
     np.testing.assert_array_equal(np.concatenate([block.states for block in blocks]), X)
 
 
+def test_text_in_frames_tells_episodes_apart():
+    frame = FRAME.assign(run=["a"] * 10 + ["b"] * 10)
+    for each in (frame, polars(frame)):
+        assert uc.load(each, **TXY, episode="run").episode_labels == ("a", "b")
+
+
 def test_several_frames_are_an_episode_each():
     demos = uc.load([FRAME, FRAME + 1], **TXY)
     assert demos.episode_labels == ("frame 0", "frame 1")

@@ -101,6 +101,19 @@ def test_the_index_of_pandas_is_no_state(tmp_path):
     assert "counts the rows, is left out" in note
 
 
+def test_letters_above_letters_are_no_units(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("run,x,u\nm,1,2\nm,3,4\ns,5,6\n")
+    assert load(path, state="x", action="u", episode="run").states.tolist() == [[1.0], [3.0], [5.0]]
+
+
+def test_long_text_in_two_bytes_a_letter(tmp_path):
+    rows = "".join(f"{i},{i % 7}\n" for i in range(20_000))
+    for encoding in ("utf-16", "utf-16-be"):
+        (tmp_path / "a.csv").write_bytes(("x,u\n" + rows).encode(encoding))
+        assert len(load(tmp_path / "a.csv", state="x", action="u")) == 20_000
+
+
 @pytest.mark.parametrize("mark", [";", "\t", "quoted"])
 def test_thousands_are_no_decimals(tmp_path, mark):
     numbers = [900 + 10 * i for i in range(20)]

@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared
+from unconstrain.recordings.formats.base import ColumnKey, Declared, note_guesses
 from unconstrain.recordings.formats.parquet import describe_columns
 from unconstrain.recordings.table import Header, row
 
@@ -66,8 +66,8 @@ class Tabular:
                 )
             column = table.column(where[nth]).slice(start, None if stop is None else stop - start)
             arrays.append(_as_one(column))
-        about = {GUESS: "\n".join(notes)} if notes else None
-        yield start, pa.RecordBatch.from_arrays(arrays, names=[name for name, _ in columns], metadata=about)
+        named = [name for name, _ in columns]
+        yield start, pa.RecordBatch.from_arrays(arrays, names=named, metadata=note_guesses(notes))
 
     def place(self, index: int) -> str:
         """Say where in the file a row is."""
@@ -86,6 +86,10 @@ class Tabular:
         table, notes = self.load_table()
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
+        # Polars hands out text as views, which other columns of text do not know.
+        views = {i: field for i, field in enumerate(table.schema) if pa.types.is_string_view(field.type)}
+        for i, field in views.items():
+            table = table.set_column(i, field.name, table.column(i).cast(pa.string()))
         return table, notes
 
 

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats import motion_capture, opensim
-from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared
+from unconstrain.recordings.formats.base import ColumnKey, Declared, note_guesses
 from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, read_text
 from unconstrain.recordings.formats.text_layout import PROBED, Layout, content, find_layout, lines_of
 from unconstrain.recordings.formats.text_parsing import parse
@@ -70,8 +70,7 @@ class Text:
         names = self._layout.names
         at = [[i for i, other in enumerate(names) if other == name][nth] for name, nth in columns]
         arrays, found = parse(data, self._layout, at, self.file.shown, self.place)
-        guesses = (*guesses, *self._layout.notes, *found)
-        about = {GUESS: "\n".join(guesses)} if guesses else None
+        about = note_guesses((*guesses, *self._layout.notes, *found))
         rows = pa.RecordBatch.from_arrays(arrays, names=[name for name, _ in columns], metadata=about)
         length = len(rows) if stop is None else stop - start
         yield start, rows.slice(start, length)

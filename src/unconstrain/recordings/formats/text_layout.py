@@ -14,7 +14,7 @@ FLAG = re.compile(r"true|false", re.IGNORECASE)
 SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 UNIT = re.compile(
     r"[\[(<{]?\s*(-|[nuµm]?s|secs?|seconds?|[ckmuµ]?m|met(re|er)s?|inch|rad|radians?|deg|degrees?|°|[kmM]?N|N\s?[·*.]?\s?m+|"
-    r"Hz|V|A|mA|%|1|(m|mm|cm|rad|deg|°)/s(\^?[2²])?)\s*[\])>}]?"
+    r"Hz|V|A|mA|%|(m|mm|cm|rad|deg|°)/s(\^?[2²])?)\s*[\])>}]?"
 )
 COMMENTS = (b"#", b"%", b"//")
 PROBED = 20
@@ -222,7 +222,10 @@ def _find_begin(lines: list[str], delimiter: str, given: bool) -> tuple[str, int
         before = rows[:begin]
         if any(len(row) > 1 and all(map(_is_number, row)) for row in before):
             continue  # samples of another length, which is a mistake to be told
-        if before and len(before[-1]) > 1 and not _is_header(rows[begin:]):
+        # A short line above samples without names may be a header that another mistake cut short.
+        last = len(before[-1]) if before else 0
+        is_prose = (last == 1 if mark != " " else abs(last - width) > 1) and len(lines[begin - 1].split()) > 1
+        if before and not is_prose and not _is_header(rows[begin:]):
             continue
         best = max(best, (len(alike), width, mark, begin), key=lambda found: found[:2])
     length, _, mark, begin = best
@@ -303,8 +306,8 @@ def _are_units(row: list[str], following: list[str]) -> bool:
     return (
         any(cells)
         and all(not cell or UNIT.fullmatch(cell) for cell in cells)
-        and not all(cell in ("", "1") for cell in cells)
-        and any(map(_is_number, following))
+        # Letters above letters may be the names of episodes.
+        and all(not cell or re.search(r"\d", below) for cell, below in zip(cells, following, strict=False))
     )
 
 

@@ -21,6 +21,7 @@ THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?\s*$"
 SURE_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}((,\d{3}){2,}(\.\d*)?|,\d{3}\.\d*)\s*$"
 BOTH = r"^\s*[+-]?[1-9]\d{0,2}(\.\d{3})+,\d+\s*$"
 PLAIN_SMALL = r"^\s*[+-]?\d{1,3}(\.\d*)?\s*$"
+HUNDREDS = r"^\s*[+-]?[1-9]\d{2}(\.\d*)?\s*$"
 PLAIN = r"^\s*[+-]?\d+(\.\d*)?\s*$"
 
 SLASHES = r"^\s*(\d{4})/(\d{1,2})/(\d{1,2})[ T]+(\d{1,2}:\d{2}:\d{2}(?:\.\d{1,9})?)\s*$"
@@ -141,7 +142,12 @@ def _without_commas(column: pa.Array, where: str, called: str, guesses: dict[str
     plain = others.filter(_matches(others, PLAIN))
     # 950 beside 1,050: a decimal that always has three digits would be 950,000.
     beside = len(plain) > 0 and pc.all(_matches(plain, PLAIN_SMALL)).as_py()
-    is_thousands = _any(numbers, SURE_THOUSANDS) or (not is_decimal and beside)
+    is_thousands = _any(numbers, SURE_THOUSANDS) or (not is_decimal and beside and _any(plain, HUNDREDS))
+    if beside and not is_decimal and not is_thousands:
+        raise DataError(
+            f"{where} holds {numbers[0].as_py().strip()!r} beside {plain[0].as_py().strip()!r}, so its comma may be a "
+            "decimal mark or set off thousands; write numbers with points and without anything between thousands"
+        )
     if is_decimal and is_thousands:
         odd = numbers.filter(pc.invert(_matches(numbers, THOUSANDS)))[0].as_py().strip()
         sure = numbers.filter(_matches(numbers, SURE_THOUSANDS))[0].as_py().strip()

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import sys
 
 import numpy as np
 import pandas as pd
@@ -112,3 +113,16 @@ def test_workbooks(tmp_path):
     (tmp_path / "d.xlsx").write_bytes((tmp_path / "b.xlsx").read_bytes()[:-100])
     with pytest.raises(DataError, match=r"d.xlsx is damaged or not an Excel workbook"):
         uc.load(tmp_path / "d.xlsx", **TXY)
+
+
+@pytest.mark.parametrize(
+    ("package", "name", "content", "extra"),
+    [("openpyxl", "a.xlsx", b"PK\x03\x04", "xlsx"), ("ezc3d", "a.c3d", b"\x02\x50" + bytes(600), "c3d")],
+)
+def test_an_extra_that_is_missing_is_named(tmp_path, monkeypatch, package, name, content, extra):
+    monkeypatch.setitem(sys.modules, package, None)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(
+        DataError, match=rf"{name} needs the package {package}.*pip install 'unconstrain\[{extra}\]'"
+    ):
+        uc.load(tmp_path / name, **TXY)

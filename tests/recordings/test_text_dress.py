@@ -39,6 +39,8 @@ def read(tmp_path, content, name="a.csv", **options):
         "My recording\nmade on Monday, by me\n\n" + table(),
         "My recording,,\nRate: 100,,\n" + table(),
         "sep=;\n" + table(mark=";"),
+        "Subject;A\nRate;100\nUnits;mm\n\n" + table(mark=";", comma=True),
+        "".join(f"line {i} of a header block\n" for i in range(40)) + table(),
         "% recorded\n% t x y\n" + table("", " "),
         "// recorded\n" + table(),
         table("t,x,y,", ";", end=";"),
@@ -54,6 +56,12 @@ def read(tmp_path, content, name="a.csv", **options):
 )
 def test_layouts_are_found(tmp_path, content):
     assert read(tmp_path, content).state_names == ("x", "y")
+
+
+def test_pairs_above_a_table_of_two_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("Subject,A\nRate,100\nx,u\n1,2\n3,4\n")
+    assert load(path, state="x", action="u").states.tolist() == [[1.0], [3.0]]
 
 
 def test_what_is_guessed_of_a_layout_is_noted(tmp_path):

@@ -144,7 +144,8 @@ def find_layout(data: bytes, shown: str) -> Layout:
         delimiter = given[1] if given else _delimiter(probe)
         rows = [split_line(line, delimiter) for line in probe]
         begin = _count_titles(rows)
-        if not begin and len({len(row) for row in rows}) > 1:
+        every = probe if len(rows[0]) > 1 else [line for _, line in lines]
+        if not begin and len({len(split_line(line, delimiter)) for line in every}) > 1:
             delimiter, begin = _find_begin([line for _, line in lines], delimiter, given is not None)
         if begin:
             first, last = lines[0][0], lines[begin - 1][0]
@@ -188,7 +189,7 @@ def find_layout(data: bytes, shown: str) -> Layout:
 
 
 def _count_titles(rows: list[list[str]]) -> int:
-    """Count the lines before the table that a spreadsheet filled up with empty cells."""
+    """Count the lines before the table that have as many cells: those that a spreadsheet filled up, among others."""
     if len({len(row) for row in rows}) > 1:
         return 0
     width = len(rows[0])
@@ -199,7 +200,13 @@ def _count_titles(rows: list[list[str]]) -> int:
         return few and not (filled and _is_number(filled[0]))
 
     begin = next((i for i, row in enumerate(rows) if not is_sparse(row)), 0)
-    return begin if begin < len(rows) - 1 else 0
+    if begin:
+        return begin if begin < len(rows) - 1 else 0
+    # Pairs of a name and a value above a table of two columns.
+    words = next((i for i, row in enumerate(rows) if row and _is_value(row[0])), 0)
+    if width != 2 or words < 2 or any(not cell.strip() or _is_value(cell) for cell in rows[words - 1]):
+        return 0
+    return words - 1 if any(_is_value(row[1]) for row in rows[: words - 1]) else 0
 
 
 def _find_begin(lines: list[str], delimiter: str, given: bool) -> tuple[str, int]:
@@ -208,9 +215,9 @@ def _find_begin(lines: list[str], delimiter: str, given: bool) -> tuple[str, int
     for mark in [delimiter] if given else ["\t", ";", ",", " "]:
         rows = [split_line(line, mark) for line in lines]
         lengths = [len(row) for row in rows]
-        width = max(set(lengths), key=lambda length: (lengths.count(length), length))
+        width = max((n for n in lengths if n > 1), key=lambda n: (lengths.count(n), n), default=0)
         alike = [row for row in rows if len(row) == width]
-        if width < 2 or not any(map(_is_number, alike[-1])):
+        if not width or not any(map(_is_number, alike[-1])):
             continue
         if mark == " " and not all(_is_number(cell) or FLAG.fullmatch(cell) for cell in alike[-1]):
             continue
@@ -319,6 +326,10 @@ def _counts_rows(names: list[str], body: list[list[str]]) -> bool:
 
 def _is_number(cell: str) -> bool:
     return NUMBER.fullmatch(cell) is not None or NUMBER.fullmatch(cell.replace(",", ".")) is not None
+
+
+def _is_value(cell: str) -> bool:
+    return _is_number(cell) or FLAG.fullmatch(cell.strip()) is not None
 
 
 def _header_in_comment(data: bytes, delimiter: str, width: int) -> list[str] | None:

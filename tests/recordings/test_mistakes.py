@@ -54,8 +54,22 @@ MOVING = "t,x\n" + "".join(f"{i / 50},{i}\n" for i in range(20))
         ("x,u\n1,2\n3\n", XU, r"a.csv: line 3 has 1 cell where the first line has 2"),
         ("x,u,e\n1,2,a\n3,4,\n", XU | {"episode": "e"}, r"column 'e' is empty at line 3"),
         (b"\x00\x01\x02\xff" * 50, XU, r"a.csv is not a text table"),
-        ("x,u\n1,2\n".encode("utf-16"), XU, r"a.csv is not a text table: save it as UTF-8"),
-        ("x,u\n1,2\n°,3\n".encode("latin-1"), XU, r"not UTF-8 text at line 3"),
+        ("x,u\n1,2\n°,3\n".encode("latin-1"), XU, r"column 'x' holds '°' at line 3"),
+        ("x,u\n1,2\n".encode("utf-16")[:-1], XU, r"a.csv is not a text table: save it as UTF-8"),
+        (
+            "x;u\n1,050;2\n1,5;3\n1,000,000;4\n",
+            XU,
+            r"holds '1,000,000' and '1,5', so its commas mean two things",
+        ),
+        (
+            "x;u\n1,050;2\n1;3\n",
+            XU,
+            r"column 'x' holds '1,050' beside '1', so its comma may be a decimal mark",
+        ),
+        ("0\n8,3\n2,4\n", {"state": 0, "action": 0}, r"line 2 has 2 cells where the first line has 1"),
+        ("x\n1,5\n2,5\n", {"state": 0, "action": 0}, r"line 2 has 2 cells where the first line has 1"),
+        (" x u\n0 1.5 2\n1 2.5 3\n", XU, r"line 2 has 3 cells where the first line has 2"),
+        ("A title\n\nx,u\n1,2\n3,4\n5,6,7\n8,9\n", XU, r"line 6 has 3 cells where the first line has 2"),
         ("t,x\n0,1\n1,2\n1,3\n", XT, r"time in column 't' repeats a stamp at line 4"),
         ("t,x\n0,1\n2,2\n1,3\n", XT, r"time in column 't' goes back at line 4"),
         ("t,x\n0,1\nlater,2\n", XT, r"column 't' holds 'later' at line 3"),
@@ -89,11 +103,13 @@ def test_paths(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("x,u\n1,2\n3,4\n")
     (tmp_path / "b.xlsx").write_text("x")
+    (tmp_path / "b.bin").write_bytes(bytes(range(256)))
     (tmp_path / "folder.csv").mkdir()
     for paths, sentence in [
         (tmp_path / "none.csv", r"there is no file .*none.csv"),
         (tmp_path / "folder.csv", r"is a folder without Parquet files: give its files, or a pattern"),
-        (tmp_path / "b.xlsx", r"suffix '.xlsx'; those known are .csv, .tsv, .txt, .npz, .parquet"),
+        (tmp_path / "b.xlsx", r"b.xlsx is damaged or not an Excel workbook"),
+        (tmp_path / "b.bin", r"suffix '.bin'; those known are .csv, .tsv, .txt, .*.npz, .*.parquet"),
         (str(tmp_path / "*.tsv"), r"no file matches"),
         ([], r"nothing was given to open"),
         ([path, path], r"a.csv is given twice"),

@@ -7,7 +7,7 @@ from numbers import Integral
 from unconstrain.errors import DataError
 
 Key = str | int
-"""A column's name, or its position counted from 0."""
+"""A column's name, or its position counted from 0; a number that is a column's name means that column."""
 
 Keys = Key | Sequence[Key]
 
@@ -22,7 +22,8 @@ NO_ANGLE = "none"
 class Columns:
     """The roles that columns of a recording play, by name or by position.
 
-    A column of lists, or an array of several columns, stands for all its components, of which `name[3]` is one.
+    A column of lists, or an array of several columns, stands for all its components, of which `name[3]` is one. The
+    beginning of names up to a point stands for all of them: `hand` for `hand.X`, `hand.Y` and `hand.Z`.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 from itertools import chain
+from typing import Any
 
 from unconstrain import demonstrations_file
 from unconstrain.demonstrations import Demonstrations
@@ -15,6 +16,7 @@ from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
 from unconstrain.recordings.formats import lerobot, recognize, rosbag_reading
 from unconstrain.recordings.formats.base import Declared, Format, narrow
+from unconstrain.recordings.formats.frame import Frame, is_frame
 from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.nested import Nested
 from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
@@ -46,9 +48,16 @@ def tell_apart(
         return [], chain([first], source) if first is not None else iter(())
     if not callable(source) and not isinstance(source, Iterable):
         raise DataError(
-            f"source must be a path or several, demonstrations, or an iterable of {FORMS}, got {source!r:.80}"
+            f"source must be a path or several, demonstrations, data frames, or an iterable of {FORMS}, "
+            f"got {source!r:.80}"
         )
     return [], source
+
+
+def find_frames(source: Any) -> list[Any]:
+    """Return the data frames that a source is; none where it is something else."""
+    each = list(source) if isinstance(source, list | tuple) else [source]
+    return each if each and all(map(is_frame, each)) else []
 
 
 def check_plain(columns: Columns, preparation: Preparation) -> None:
@@ -103,6 +112,38 @@ def open_demonstrations(demos: Demonstrations, columns: Columns, preparation: Pr
     about = demonstrations_file.describe(demos, {name: name for name in arrays})
     held = InMemory(arrays, about)
     return Tables((_recording([held], "these demonstrations", "", "", 0, True, columns, preparation, None),))
+
+
+def open_frames(frames: Sequence[Any], columns: Columns, preparation: Preparation) -> Tables:
+    """Open data frames in memory as if each lay in a file.
+
+    Parameters
+    ----------
+    frames : sequence of pandas, Polars or Arrow tables
+    columns : Columns
+        As given.
+    preparation : Preparation
+        As given.
+
+    Returns
+    -------
+    Tables
+        A recording each.
+
+    Raises
+    ------
+    DataError
+        There are no such columns, or they cannot be used.
+    """
+    several = len(frames) > 1
+    names = [f"frame {number}" if several else "this frame" for number in range(len(frames))]
+    recordings = tuple(
+        _recording([Frame(frame, name)], name, name, name, number, not several, columns, preparation, None)
+        for number, (frame, name) in enumerate(zip(frames, names, strict=True))
+    )
+    tables = Tables(recordings)
+    tables.check_alike()
+    return tables
 
 
 def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparation: Preparation) -> Tables:
@@ -254,7 +295,11 @@ def _recording(
         if not declared.saved:  # its notes are on what it takes for time
             notes = declared.notes if columns.time is None else ()
             declared = replace(declared, notes=tuple(f"{name}: {note}" for note in notes))
-    if columns.state is None and columns != Columns(topic=columns.topic) and (declared is None or not declared.saved):
+    if (
+        columns.state is None
+        and columns != Columns(topic=columns.topic)
+        and (declared is None or not declared.saved)
+    ):
         raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
     try:
         roles = assign_roles(header, own, declared, preparation, shown)

@@ -392,13 +392,11 @@ class Recording:
     def _load(self, pieces: Sequence[Piece], start: int, everything: bool) -> Loaded:
         prepares = everything or self.whole_episodes_for is not None
         loaded = self._prepare(pieces, start, everything) if prepares else Loaded(self._take(pieces, start))
-        guesses: set[bytes] = {
-            guess
-            for piece in pieces
-            if GUESS in (metadata := piece.rows.schema.metadata or {})
-            for guess in metadata[GUESS].splitlines()
-        }
-        notes = [Note("guess", self.name, guess.decode()) for guess in sorted(guesses)]
+        guesses: dict[bytes, None] = {}
+        for piece in pieces:
+            said = (piece.rows.schema.metadata or {}).get(GUESS, b"")
+            guesses |= dict.fromkeys(guess for guess in said.split(b"\n") if guess)
+        notes = [Note("guess", self.name, guess.decode()) for guess in guesses]
         if not prepares and self.roles.time is not None:
             notes += self.clock.note(self.name)
         loaded = replace(loaded, notes=(*notes, *loaded.notes))

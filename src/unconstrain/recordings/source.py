@@ -15,7 +15,14 @@ from unconstrain.recordings.batches import Batches
 from unconstrain.recordings.blocks import Loaded, Source
 from unconstrain.recordings.columns import Columns, Key, Keys
 from unconstrain.recordings.notes import Note, add_up, combine
-from unconstrain.recordings.opening import check_plain, open_demonstrations, open_files, tell_apart
+from unconstrain.recordings.opening import (
+    check_plain,
+    find_frames,
+    open_demonstrations,
+    open_files,
+    open_frames,
+    tell_apart,
+)
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.reading import without_tallies
 from unconstrain.recordings.recording import Recording
@@ -307,13 +314,15 @@ def open(
 
     Parameters
     ----------
-    source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
-        A file in CSV, TSV, TXT, NPZ, NPY, MATLAB, HDF5 or Parquet, or a ROS bag; on disk, or at a URI such as
+    source : path, pattern, URI, several of them, Demonstrations, data frames, or batches of arrays
+        A file of text (CSV and the like under any suffix, also compressed; exports of Vicon, Motive and OpenSim), JSON
+        Lines, XLSX, C3D, MATLAB, HDF5, NPZ, NPY or Parquet, or a ROS bag; on disk, or at a URI such as
         ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are
         parts of one recording, one of .npy arrays, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns
-        have known names. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups,
-        projections)``: states (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where
-        a constraint is not known; or a function that returns such an iterable, which can then be read more than once.
+        have known names. A data frame of pandas or Polars, or an Arrow table, is a recording, and so is each of
+        several. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states
+        (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not
+        known; or a function that returns such an iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
@@ -378,6 +387,9 @@ def open(
         return source
     if isinstance(source, Demonstrations):
         return Recordings(open_demonstrations(source, columns, preparation), columns, preparation)
+    frames = find_frames(source)
+    if frames:
+        return Recordings(open_frames(frames, columns, preparation), columns, preparation)
     paths, batches = tell_apart(source)
     if paths:
         tables = open_files(paths, columns, preparation)

@@ -141,6 +141,9 @@ class Header:
             return self._named(role, key)
         if isinstance(key, bool) or not isinstance(key, int | np.integer):
             raise DataError(f"{role} takes column names or positions (integers counted from 0), got {key!r}")
+        called = [i for i, column in enumerate(self.columns) if column.name == str(key)]
+        if len(called) == 1:  # years, and the numbers that pandas calls columns by
+            return called
         if not 0 <= key < len(self.columns):
             raise DataError(
                 f"{self.path} has no column at position {key} for {role}: "
@@ -157,6 +160,9 @@ class Header:
                 f"(counted from 0); choose for {role}= by position instead, such as {positions[0]}"
             )
         positions = positions or [i for i, column in enumerate(self.columns) if column.part_of == name]
+        positions = positions or [
+            i for i, column in enumerate(self.columns) if column.name.startswith(f"{name}.")
+        ]
         if positions:
             return positions
         if name in self.unusable:

@@ -3,7 +3,9 @@
 from unconstrain.errors import DataError
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import Format
+from unconstrain.recordings.formats.c3d import C3D
 from unconstrain.recordings.formats.hdf5 import Hdf5
+from unconstrain.recordings.formats.json_lines import JsonLines
 from unconstrain.recordings.formats.matlab import Matlab, Matlab73
 from unconstrain.recordings.formats.npy import Npy
 from unconstrain.recordings.formats.npz import Npz
@@ -11,13 +13,17 @@ from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.rosbag import RosBag
 from unconstrain.recordings.formats.saved import Saved
 from unconstrain.recordings.formats.text import Text
+from unconstrain.recordings.formats.text_encoding import is_text
+from unconstrain.recordings.formats.xlsx import Xlsx
 
-FORMATS: tuple[type[Format], ...] = (RosBag, Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Npz, Text)
+FORMATS: tuple[type[Format], ...] = (
+    RosBag, Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Xlsx, Npz, C3D, JsonLines, Text,
+)  # fmt: skip
 """In the order in which they are tried."""
 
 
 def recognize(file: File) -> Format:
-    """Open a file in the format that its content is in, or else the one that its suffix promises.
+    """Open a file in the format that its content is in, or else the one that its suffix promises, or else as text.
 
     Parameters
     ----------
@@ -40,5 +46,7 @@ def recognize(file: File) -> Format:
     for kind in FORMATS:
         if file.suffix in kind.suffixes:
             return kind(file)
+    if is_text(file):
+        return Text(file)
     known = ", ".join(suffix for kind in FORMATS[::-1] for suffix in kind.suffixes)
     raise DataError(f"{file.shown} cannot be read by its suffix {file.suffix!r}; those known are {known}")

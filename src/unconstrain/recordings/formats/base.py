@@ -1,6 +1,6 @@
 """What a file format must do: one class a format, and a table of them in `unconstrain.recordings.formats`."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
@@ -50,6 +50,22 @@ class Declared:
     action_names: tuple[str, ...] | None = None
     episode_labels: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+
+def note_guesses(guesses: Iterable[str]) -> dict[bytes, bytes] | None:
+    """Return the metadata of rows that tell what was guessed of them, without what a terminal would act on.
+
+    Parameters
+    ----------
+    guesses : iterable of str
+        A sentence each; those that come twice are told once.
+
+    Returns
+    -------
+    dict or None
+    """
+    lines = ["".join(c for c in guess if c.isprintable()) for guess in dict.fromkeys(guesses)]
+    return {GUESS: "\n".join(lines).encode()} if lines else None
 
 
 class Format(Protocol):

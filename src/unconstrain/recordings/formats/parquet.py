@@ -135,7 +135,7 @@ class Parquet:
             raise DataError(f"{self.file.shown} has no samples")
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
             first = next(opened.iter_batches(1))
-            return _header(first, self.file.shown, sum(self.row_groups))
+            return describe_columns(first, self.file.shown, sum(self.row_groups))
 
     def _open(self) -> Any:
         # Object stores get whole row groups at once. Nothing is mapped: a file that is cut while it is mapped ends
@@ -150,7 +150,22 @@ class Parquet:
         return pq.ParquetFile(self.file.path, buffer_size=BUFFERED, page_checksum_verification=True)
 
 
-def _header(first: pa.RecordBatch, shown: str, length: int) -> Header:
+def describe_columns(first: Any, shown: str, length: int) -> Header:
+    """Describe the columns of Arrow rows, lists of k numbers as k of them, as the first row has them.
+
+    Parameters
+    ----------
+    first : pyarrow.RecordBatch or pyarrow.Table
+        At least the first row.
+    shown : str
+        Where it is from, as the user calls it.
+    length : int
+        The number of rows there are.
+
+    Returns
+    -------
+    Header
+    """
     columns: list[Column] = []
     lists: dict[str, tuple[pa.DataType, int | None]] = {}
     unusable: dict[str, str] = {}

@@ -1,0 +1,134 @@
+"""Text that motion capture programs export: Vicon Nexus and OptiTrack Motive, with their header blocks."""
+
+import csv
+from collections.abc import Sequence
+
+from unconstrain.recordings.formats.text_layout import NUMBER, FrameTime, Layout, split_line
+
+WANTED = "Trajectories"
+"""The part of a Vicon export that holds where markers are."""
+
+LARGEST_HEADER = 40
+"""Lines among which the names of columns stand."""
+
+
+def find_vicon(lines: Sequence[str]) -> Layout | None:
+    """Find the layout of an export of Vicon Nexus.
+
+    Each part of it has a title, the rate (Hz), the names of markers or devices, the names of their components, units,
+    and samples up to an empty line. Frames are numbered; the time is made of them and the rate.
+
+    Parameters
+    ----------
+    lines : sequence of str
+
+    Returns
+    -------
+    Layout or None
+        Of the trajectories, if there are any; None where another program wrote the text.
+    """
+    heads = [i for i, line in enumerate(lines) if i > 2 and _bare(line).startswith("framesubframe")]
+    if not heads or heads[0] > LARGEST_HEADER:
+        return None
+    titles = [lines[i - 3].strip(' ",;\t') for i in heads]
+    chosen = titles.index(WANTED) if WANTED in titles else 0
+    at = heads[chosen]
+    delimiter = next((mark for mark in "\t;," if mark in lines[at]), ",")
+    try:
+        rate, named, called, units = (
+            split_line(line, delimiter) for line in (*lines[at - 2 : at + 1], *lines[at + 1 : at + 2])
+        )
+        per_second = float(rate[0].replace(",", "."))
+    except (ValueError, IndexError, csv.Error):
+        return None
+    if not per_second > 0:
+        return None
+    width = max(len(called), len(units))
+    called, named = called + [""] * (width - len(called)), named + [""] * (width - len(named))
+    names = ["Frame", "Sub Frame"]
+    owner = ""
+    for name, component in zip(named[2:], called[2:], strict=True):
+        owner = name.strip() or owner
+        names.append(_join(owner, component.strip()))
+    has_units = not any(NUMBER.fullmatch(cell) for cell in units)
+    notes = [f"time is made of the frame numbers and the rate of the header, {per_second:g} Hz"]
+    if has_units:
+        notes += _note_units(units[2:])
+    if len(titles) > 1:
+        others = ", ".join(title for i, title in enumerate(titles) if i != chosen)
+        notes.append(f"of its parts {titles[chosen]} is read; cut the file apart to read {others}")
+    return Layout(
+        delimiter, width, (*names, "time"), (*range(width), None), at + 1 + has_units, tuple(notes),
+        FrameTime(0, 1, per_second), is_padded=True, ends_at_blank=True,
+    )  # fmt: skip
+
+
+def find_motive(lines: Sequence[str]) -> Layout | None:
+    """Find the layout of an export of OptiTrack Motive.
+
+    Its first line describes the recording. Later ones name the type, the body or marker, and what of it each column
+    is. A position is called `NAME.X`, a quaternion `NAME.QX`, and Euler angles `NAME.RX`.
+
+    Parameters
+    ----------
+    lines : sequence of str
+
+    Returns
+    -------
+    Layout or None
+        None where another program wrote the text.
+    """
+    if not lines or not lines[0].lstrip('"').startswith("Format Version"):
+        return None
+    try:
+        about = split_line(lines[0], ",")
+        said = dict(zip(about[::2], about[1::2], strict=False))
+        rows = [split_line(line, ",") for line in lines[:LARGEST_HEADER]]
+    except csv.Error:
+        return None
+    at = next((i for i, row in enumerate(rows) if i > 2 and row[:1] == ["Frame"]), None)
+    if at is None:
+        return None
+    width = max(map(len, rows[at - 1 : at + 1]))
+
+    def cells(row: Sequence[str]) -> list[str]:
+        return [cell.strip() for cell in row] + [""] * (width - len(row))
+
+    named = next((cells(row) for row in rows[1:at] if row[1:2] == ["Name"]), None)
+    kinds, axes = cells(rows[at - 1]), cells(rows[at])
+    if named is None:
+        return None
+    letter = {"Rotation": "Q" if said.get("Rotation Type", "Quaternion") == "Quaternion" else "R"}
+    names = ["Frame"]
+    for name, kind, axis in zip(named[1:], kinds[1:], axes[1:], strict=True):
+        own = letter.get(kind, "") + axis if axis else kind
+        names.append(_join(name, own) if name and name != "Name" else axis)
+    notes = [
+        f"{what} are {said[key].lower()}, as the header says, and not converted"
+        for what, key in (("lengths", "Length Units"), ("rotations", "Rotation Type"))
+        if said.get(key)
+    ]
+    columns: tuple[int | None, ...] = tuple(range(width))
+    time = None
+    rate = said.get("Export Frame Rate") or said.get("Capture Frame Rate") or ""
+    if not any(name.startswith("Time") for name in names) and NUMBER.fullmatch(rate) and float(rate) > 0:
+        time = FrameTime(0, None, float(rate))
+        names, columns = [*names, "time"], (*columns, None)
+        notes.append(f"time is made of the frame numbers and the rate of the header, {float(rate):g} Hz")
+    return Layout(",", width, tuple(names), columns, at + 1, tuple(notes), time, is_padded=True)
+
+
+def _bare(line: str) -> str:
+    return line[:40].translate(_NOTHING).lower()
+
+
+_NOTHING = str.maketrans("", "", ' ",;\t')
+
+
+def _join(owner: str, component: str) -> str:
+    return f"{owner}.{component}" if owner and component else owner or component
+
+
+def _note_units(units: Sequence[str]) -> list[str]:
+    found = dict.fromkeys(unit for cell in units if (unit := cell.strip()))
+    return [f"units are {', '.join(found)}, as the file says, and not converted"] if found else []

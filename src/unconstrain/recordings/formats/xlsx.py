@@ -1,0 +1,90 @@
+"""Sheets of Excel workbooks, read as the text table that they are."""
+
+import datetime
+import io
+import zipfile
+from functools import cached_property
+from typing import Any, ClassVar
+
+from unconstrain.errors import DataError
+from unconstrain.memory import check_memory
+from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.base import damage_named
+from unconstrain.recordings.formats.text import Text
+
+BOOK = "xl/workbook.xml"
+
+
+class Xlsx(Text):
+    """The first sheet of a workbook that holds a table; titles, units and the rest are found as in text.
+
+    Parameters
+    ----------
+    file : File
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = (".xlsx", ".xlsm")
+
+    @classmethod
+    def matches(cls, file: File) -> bool:
+        """Whether the content is a workbook."""
+        if file.magic[:4] != b"PK\x03\x04":
+            return False
+        try:
+            with file.open() as opened, zipfile.ZipFile(opened) as archive:
+                return BOOK in archive.namelist()
+        except Exception:  # a damaged archive; which one its suffix tells
+            return False
+
+    def place(self, index: int) -> str:
+        """Say in which row of the sheet a sample is."""
+        return super().place(index).replace("line", "row")
+
+    def _read(self) -> tuple[bytes, tuple[str, ...]]:
+        return self._sheet
+
+    def _begin(self) -> tuple[bytes, bool]:
+        return self._sheet[0], True
+
+    @cached_property
+    def _sheet(self) -> tuple[bytes, tuple[str, ...]]:
+        try:
+            import openpyxl
+        except ImportError:
+            raise DataError(
+                f"reading {self.file.shown} needs the package openpyxl, which is not installed: "
+                "pip install 'unconstrain[xlsx]'"
+            ) from None
+        shown = self.file.shown
+        with damage_named(shown, "an Excel workbook"):
+            content = self.file.read()
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                unpacked = sum(member.file_size for member in archive.infolist())
+            check_memory(4.0 * unpacked, f"reading {shown}", "save its sheet as CSV")
+            book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+            sheets = [sheet.title for sheet in book.worksheets]
+            for sheet in book.worksheets:
+                rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
+                if sum(any(row) for row in rows) > 1:
+                    break
+            else:
+                raise DataError(f"{shown} is empty: no sheet in it has a header and samples")
+        width = max(max((i for i, cell in enumerate(row, start=1) if cell), default=0) for row in rows)
+        filled = (row[:width] + [""] * (width - len(row)) if any(row) else [] for row in rows)
+        text = "\n".join("\t".join(row) for row in filled)
+        others = [title for title in sheets if title != sheet.title]
+        which = f"of its sheets {sheet.title!r} is read; save another one as a file of its own to read that"
+        return text.encode(), (which,) if others else ()
+
+
+def _text(cell: Any) -> str:
+    """Write a cell as a text table would hold it."""
+    if cell is None:
+        return ""
+    if isinstance(cell, datetime.datetime):
+        return cell.isoformat(" ")
+    if isinstance(cell, datetime.timedelta):
+        return repr(cell.total_seconds())
+    if isinstance(cell, str):
+        return " ".join(cell.replace('"', "'").split())
+    return str(cell)

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from tests.cli.commands import COLUMNS, share
@@ -73,3 +74,22 @@ def test_mistakes(run, movements, policy, arguments, sentence):
     assert code == 2
     assert sentence in err
     assert "Traceback" not in err
+
+
+def test_columns_in_another_order_are_refused(run, tmp_path):
+    t = np.arange(300) * 0.02
+    numbers = np.column_stack([np.sin(2 * t), np.cos(3 * t), 1000 * t])
+    for header in ("x,y,t", "y,x,t", "a,b,t"):
+        rows = numbers if header == "x,y,t" else numbers[:, [1, 0, 2]]
+        lines = [header, *(",".join(map(str, row)) for row in rows.tolist())]
+        (tmp_path / f"{header[0]}.csv").write_text("\n".join(lines) + "\n")
+    reading = ("--time", "t", "--model", "linear", "--overwrite")
+    code, out, err = run("fit", "x.csv", "--state", "0,1", *reading)
+    assert code == 0, err
+    assert "read: 300 samples, 1 episode, 1 file, 50 Hz, 5.98 s, time in ms" in out
+    assert "--time-unit" in out
+    for other, found in (("y.csv", "y, x"), ("a.csv", "a, b")):
+        code, _, err = run("evaluate", "policy.skops", other)
+        assert code == 2
+        assert f"learnt from the states x, y, and these recordings have {found} in their place" in err
+    assert run("evaluate", "policy.skops", "a.csv", "--state", "b,a", "--time", "t")[0] == 0

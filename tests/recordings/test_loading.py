@@ -211,7 +211,9 @@ def test_units_of_time(tmp_path, stamps, unit):
     demos = load(path, state="x", time="t", time_unit=unit)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-6)
     guess = "a.csv: time is taken to be in ns, by its typical step of 2e+07"
-    assert [note.split(";")[0] for note in demos.notes[:-1]] == ([guess] if stamps[0] == 0.0 and not unit else [])
+    assert [note.split(";")[0] for note in demos.notes[:-1]] == (
+        [guess] if stamps[0] == 0.0 and not unit else []
+    )
     assert demos.notes[-1].startswith("read: 60 samples, 1 episode, 1 file, 50 Hz, 1.18 s, time in ")
 
 

@@ -52,7 +52,9 @@ def test_the_size_of_an_epoch_decides(tmp_path, step, unit, ticks):
     ("step", "unit"), [(0.02, "s"), (20, "ms"), (100, "ms"), (20_000, "us"), (100_000, "us"), (2e7, "ns")]
 )
 def test_other_units_are_guessed_by_the_step_and_said(tmp_path, step, unit):
-    demos = uc.load(parquet(tmp_path / "a.parquet", x=X, t=np.arange(200) * step), state="x", time="t", window=1)
+    demos = uc.load(
+        parquet(tmp_path / "a.parquet", x=X, t=np.arange(200) * step), state="x", time="t", window=1
+    )
     assert read(demos).endswith(f"time in {unit}")
     if unit != "s":
         assert "give time_unit=" in noted(demos, f"in {unit}, by its typical step")
@@ -60,7 +62,9 @@ def test_other_units_are_guessed_by_the_step_and_said(tmp_path, step, unit):
 
 def test_frame_numbers_are_not_seconds_in_silence(tmp_path):
     path = parquet(tmp_path / "a.parquet", x=X, frame=np.arange(200))
-    assert "give rate= or time_unit=" in noted(uc.load(path, state="x", time="frame", window=5), "goes up by 1")
+    assert "give rate= or time_unit=" in noted(
+        uc.load(path, state="x", time="frame", window=5), "goes up by 1"
+    )
     demos = uc.load(path, state="x", time="frame", rate=50)
     np.testing.assert_allclose(demos.time, TIME)
     assert demos.notes == ("read: 200 samples, 1 episode, 1 file, 50 Hz, 3.98 s, time in frames",)
@@ -239,7 +243,9 @@ def test_blocks_hold_what_loading_gives(tmp_path, options, batch_rows):
     whole = recordings.load()
     blocks = list(recordings.blocks(batch_rows))
     for name in ("states", "actions", "time"):
-        np.testing.assert_array_equal(np.concatenate([getattr(b, name) for b in blocks]), getattr(whole, name))
+        np.testing.assert_array_equal(
+            np.concatenate([getattr(b, name) for b in blocks]), getattr(whole, name)
+        )
     assert tuple(map(str, recordings.notes)) == whole.notes
     policy = uc.ParametricPolicy(risk="direct", alpha=1.0)
     streamed = uc.fit_stream(policy, recordings, batch_rows=batch_rows)

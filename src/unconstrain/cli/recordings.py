@@ -65,7 +65,7 @@ class Recorded:
         """Return how to read other recordings like these, to be saved with a policy."""
         return (
             replace(self.columns, force=None, free=None, projections=None),
-            replace(self.preparation, force_threshold=None, action_is=opened.given[1].action_is),
+            replace(opened.guessed, force_threshold=None),
         )
 
     def like(self, kept: tuple[Columns, Preparation] | None) -> "Recorded":
@@ -161,7 +161,7 @@ def describe_notes(notes: Iterable[object], states: Sequence[str], actions: Sequ
     for sentence in sentences:
         if sentence.startswith(BEGINS):
             reporting.say(sentence)
-    reporting.say(f"states: {', '.join(states)}; actions: {', '.join(actions)}")
+    reporting.say(f"states {', '.join(states)}, actions {', '.join(actions)}")
     for sentence in sentences:
         if not sentence.startswith(BEGINS):
             reporting.say(f"note: {sentence}")

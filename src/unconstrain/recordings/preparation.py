@@ -106,7 +106,17 @@ class Preparation:
                 raise DataError(f"{field.name} must be a positive number, got {_shown(value)}")
 
     def drops(self, what: str) -> bool:
-        """Whether one of `DROPPED` is left out."""
+        """Whether something is left out.
+
+        Parameters
+        ----------
+        what : {"missing", "duplicates", "short", "pauses"}
+
+        Returns
+        -------
+        bool
+            Whether `drop` names it.
+        """
         return isinstance(self.drop, str) and what in self.drop.split(",")
 
 

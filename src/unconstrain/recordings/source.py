@@ -78,10 +78,20 @@ class Recordings:
     def preparation(self) -> Preparation:
         """What is done to samples, with the unit of time that was found, where it is the same in all files."""
         given = self.given[1]
-        if not isinstance(self.source, Tables):
+        if not isinstance(self.source, Tables) or given.rate is not None:
             return given
         units = {each.clock.unit for each in self.source.recordings if each.roles.time is not None}
         return replace(given, time_unit=units.pop()) if len(units) == 1 else given
+
+    @property
+    def guessed(self) -> Preparation:
+        """The preparation as given, with the unit of time and the kind of actions where these were guessed."""
+        given = self.given[1]
+        if not isinstance(self.source, Tables) or self.source.recordings[0].roles.time is None:
+            return given
+        clock = self.source.recordings[0].clock
+        # What may be frames is to be doubted again in other recordings.
+        return replace(given, time_unit=clock.unit) if clock.guessed and not clock.counts else given
 
     @property
     def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:

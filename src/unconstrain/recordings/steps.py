@@ -11,22 +11,41 @@ BURSTS = 0.05
 LONG_STEPS = 5.0
 
 
-def typical_step(steps: NDArray[Any]) -> float:
-    """Return the step between samples (M,) that most steps are near to, in their unit; 0.0 where there is none.
+# Between bursts less than this passes (s); what is longer is a gap.
+BETWEEN = 1.0
+
+
+def typical_step(steps: NDArray[Any], second: float = 1.0) -> float:
+    """Return the step between samples that most steps are near to.
 
     It is the median, but where stamps come in bursts the mean of all steps that are no gaps.
+
+    Parameters
+    ----------
+    steps : ndarray of shape (M,)
+        In any unit.
+    second : float
+        A second in that unit.
+
+    Returns
+    -------
+    float
+        In that unit; 0.0 where there is none.
     """
     going = steps[steps > 0]
     if not len(going):
         return 0.0
-    if not comes_in_bursts(going):
+    if not comes_in_bursts(going, second):
         return float(np.median(going))
     return float(np.mean(going[going <= LONG_STEPS * np.percentile(going, 95)]))
 
 
-def comes_in_bursts(steps: NDArray[Any]) -> bool:
-    """Whether most steps (M,) are much shorter than what passes between samples."""
-    return len(steps) > 1 and bool(np.mean(steps > LONG_STEPS * np.median(steps)) > BURSTS)
+def comes_in_bursts(steps: NDArray[Any], second: float = 1.0) -> bool:
+    """Whether most steps (M,) are much shorter than what passes between samples; a `second` is in their unit."""
+    if len(steps) < 2:
+        return False
+    long = steps[steps > LONG_STEPS * np.median(steps)]
+    return len(long) > BURSTS * len(steps) and bool(np.median(long) <= BETWEEN * second)
 
 
 def runs(codes: NDArray[np.int64]) -> list[NDArray[np.int64]]:

@@ -1,5 +1,6 @@
 """Time stamps as they are written, made seconds since the start of each episode."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -86,11 +87,14 @@ class Clock:
         ticks, own = _ticks(stamps, text)
         order = np.argsort(episodes, kind="stable")
         steps = np.diff(ticks[order])[np.diff(episodes[order]) == 0]
-        typical = typical_step(steps)
         if rate is not None and own is None:
-            return cls("frames", text, typical / rate, rate)
-        guess, guessed = _guess(float(abs(ticks[0])) if len(ticks) else 0.0, typical)
+            return cls("frames", text, typical_step(steps, rate) / rate, rate)
+        first = float(abs(ticks[0])) if len(ticks) else 0.0
+        guess, guessed = _guess(first, typical_step(steps, math.inf))
         found = own or unit or guess
+        typical = typical_step(steps, TIME_UNITS[found])
+        if own is unit is None:  # what seemed bursts may have been gaps
+            found, guessed = _guess(first, typical)
         guessed = guessed and own is unit is None
         seconds = TIME_UNITS[found]
         return cls(

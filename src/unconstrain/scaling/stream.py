@@ -233,7 +233,7 @@ def finish(
     """Solve; only here does the policy change."""
     check_enough(accumulator.total)
     policy.finish(accumulator, scalar_actions=recordings.source.scalar_actions)
-    policy.recording_ = recordings.given
+    policy.recording_ = (recordings.given[0], recordings.guessed)
     recordings.notes = recordings.findings(notes)
     return policy
 

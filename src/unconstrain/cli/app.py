@@ -12,6 +12,7 @@ from unconstrain.cli.demo import demo
 from unconstrain.cli.diagnose import diagnose
 from unconstrain.cli.evaluate import evaluate
 from unconstrain.cli.fit import fit
+from unconstrain.cli.inspect import inspect
 from unconstrain.cli.rollout import rollout
 
 WIDTH = 100
@@ -37,7 +38,7 @@ def program() -> None:
     """Learn the policy behind constrained demonstrations."""
 
 
-for command in (demo, fit, evaluate, diagnose, constraints, rollout):
+for command in (demo, inspect, fit, evaluate, diagnose, constraints, rollout):
     program.add_command(command)
 
 

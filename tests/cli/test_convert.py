@@ -19,7 +19,10 @@ from unconstrain.recordings.lerobot_dataset import write_lerobot
 def test_a_file_needs_no_options_any_more(movements, tmp_path, suffix):
     out = tmp_path / f"out{suffix}"
     assert run(["convert", str(movements), *COLUMNS, "--time", "t", "--out", str(out)]) == 0
-    demos, again = uc.load(movements, state=["x1", "x2"], action=["u1", "u2"], time="t", episode="episode"), uc.load(out)
+    demos, again = (
+        uc.load(movements, state=["x1", "x2"], action=["u1", "u2"], time="t", episode="episode"),
+        uc.load(out),
+    )
     np.testing.assert_array_equal(again.states, demos.states)
     np.testing.assert_array_equal(again.actions, demos.actions)
     np.testing.assert_array_equal(again.episodes, demos.episodes)
@@ -28,7 +31,10 @@ def test_a_file_needs_no_options_any_more(movements, tmp_path, suffix):
 def test_a_lerobot_dataset_is_read_by_our_reader(movements, tmp_path):
     out = tmp_path / "dataset"
     assert run(["convert", str(movements), *COLUMNS, "--time", "t", "--out", str(out)]) == 0
-    demos, again = uc.load(movements, state=["x1", "x2"], action=["u1", "u2"], time="t", episode="episode"), uc.load(out)
+    demos, again = (
+        uc.load(movements, state=["x1", "x2"], action=["u1", "u2"], time="t", episode="episode"),
+        uc.load(out),
+    )
     np.testing.assert_allclose(again.states, demos.states, rtol=1e-6)
     np.testing.assert_allclose(again.actions, demos.actions, rtol=1e-6)
     np.testing.assert_array_equal(again.episodes, demos.episodes)
@@ -58,7 +64,9 @@ def test_what_lerobot_reads_of_a_dataset_is_there(tmp_path):
 
 def test_an_uneven_rate_has_to_be_named(tmp_path):
     t = np.cumsum(np.random.default_rng(0).uniform(0.005, 0.02, 400))
-    demos = Demonstrations(np.stack([np.sin(t), np.cos(t)], axis=1), np.stack([np.cos(t), -np.sin(t)], axis=1), time=t)
+    demos = Demonstrations(
+        np.stack([np.sin(t), np.cos(t)], axis=1), np.stack([np.cos(t), -np.sin(t)], axis=1), time=t
+    )
     with pytest.raises(DataError, match="give fps="):
         write_lerobot(demos, tmp_path / "d")
     assert not (tmp_path / "d").exists()

@@ -13,7 +13,10 @@ from unconstrain.progress import working
 )
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @click.option(
-    "--json", "as_json", is_flag=True, help="Print one JSON object: rows, episodes, rate_hz, duration_s, columns, notes, next."
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one JSON object: rows, episodes, rate_hz, duration_s, columns, notes, next.",
 )
 @click.option("--keys", is_flag=True, help="Only list the columns, or the topics where a file has these.")
 def inspect(files: tuple[str, ...], as_json: bool, keys: bool) -> None:

@@ -95,7 +95,9 @@ def check_apart(inputs: Sequence[str | os.PathLike[str]], folder: Path) -> None:
     for path in (_real(path) for each in inputs for path in _expanded(each)):
         parts = (path, real)
         if path == real or any(a.startswith(os.path.join(b, "")) for a, b in (parts, parts[::-1])):
-            raise DataError(f"{folder} holds what is read, or lies in a folder that is read: choose another name for out=")
+            raise DataError(
+                f"{folder} holds what is read, or lies in a folder that is read: choose another name for out="
+            )
 
 
 def check_new(path: Path, name: str, *, overwrite: bool) -> None:

@@ -12,7 +12,17 @@ if TYPE_CHECKING:
     from unconstrain.recordings.preparation import Preparation
     from unconstrain.recordings.source import Recordings, load, open
 
-__all__ = ["Columns", "Inspection", "Note", "Preparation", "Recordings", "differentiate", "inspect", "load", "open"]
+__all__ = [
+    "Columns",
+    "Inspection",
+    "Note",
+    "Preparation",
+    "Recordings",
+    "differentiate",
+    "inspect",
+    "load",
+    "open",
+]
 
 _HOMES = {
     "unconstrain.recordings.columns": ("Columns",),

@@ -87,7 +87,9 @@ def check_folder(path: Path, *, overwrite: bool) -> None:
     if not overwrite:
         raise DataError(f"{path} exists: give overwrite= to replace it, or another name with out=")
     if not (path / ABOUT).is_file():
-        raise DataError(f"{path} is not a LeRobot dataset, so it is not replaced: choose another name with out=")
+        raise DataError(
+            f"{path} is not a LeRobot dataset, so it is not replaced: choose another name with out="
+        )
 
 
 def _rate(demos: Demonstrations, fps: float | None) -> int:

@@ -73,7 +73,12 @@ def test_velocities_are_taken_only_if_they_are_the_derivative(tmp_path, factor):
     t, phase = circles()
     rate = 2 * np.pi * 3 / t[-1] * factor
     path = write(
-        tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase), vx=-rate * np.sin(phase), vy=rate * np.cos(phase)
+        tmp_path / "a.csv",
+        t=t,
+        x=np.cos(phase),
+        y=np.sin(phase),
+        vx=-rate * np.sin(phase),
+        vy=rate * np.cos(phase),
     )
     found = uc.inspect(path)
     assert ("--action vx,vy" in found.next) == (factor == 1.0)
@@ -81,10 +86,8 @@ def test_velocities_are_taken_only_if_they_are_the_derivative(tmp_path, factor):
 
 
 def test_without_time_velocities_that_agree_are_enough(tmp_path):
-    t, phase = circles()
-    path = write(
-        tmp_path / "a.csv", x1=np.cos(phase), x2=np.sin(phase), u1=-np.sin(phase), u2=np.cos(phase)
-    )
+    _, phase = circles()
+    path = write(tmp_path / "a.csv", x1=np.cos(phase), x2=np.sin(phase), u1=-np.sin(phase), u2=np.cos(phase))
     found = uc.inspect(path)
     assert found.rate_hz is None
     assert "--action u1,u2" in found.next
@@ -109,7 +112,9 @@ def test_a_column_that_changes_where_time_starts_anew_tells_episodes_apart(tmp_p
     assert any("time starts anew" in note for note in found.notes)
 
 
-@pytest.mark.parametrize(("unit", "ticks", "epoch"), [("ms", 1e3, 1.7e12), ("us", 1e6, 1.7e15), ("ns", 1e9, 1.7e18)])
+@pytest.mark.parametrize(
+    ("unit", "ticks", "epoch"), [("ms", 1e3, 1.7e12), ("us", 1e6, 1.7e15), ("ns", 1e9, 1.7e18)]
+)
 def test_the_size_of_an_epoch_tells_the_unit(tmp_path, unit, ticks, epoch):
     t, phase = circles(hz=5)
     stamps = [int(epoch) + round(value * ticks) for value in t]
@@ -129,7 +134,14 @@ def test_oddities_are_noted(tmp_path):
     q = dict(zip(("qx", "qy", "qz", "qw"), quaternion, strict=True))
     temperature = np.where(np.arange(300) % 50 == 0, np.nan, 20.5)
     path = write(
-        tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase), heading=yaw, **q, temp=temperature, fixed=t * 0 + 4
+        tmp_path / "a.csv",
+        t=t,
+        x=np.cos(phase),
+        y=np.sin(phase),
+        heading=yaw,
+        **q,
+        temp=temperature,
+        fixed=t * 0 + 4,
     )
     found = uc.inspect(path)
     notes = " ".join(found.notes)
@@ -197,7 +209,7 @@ def test_keys_lists_the_columns_alone(tmp_path):
 
 def test_an_output_that_exists_is_not_named(tmp_path):
     t, phase = circles()
-    path = write(tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase))
+    write(tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase))
     (tmp_path / "a.skops").touch()
     with contextlib.chdir(tmp_path):
         assert uc.inspect("a.csv").next.endswith("--out a-2.skops")
@@ -225,7 +237,11 @@ def test_the_tables_of_a_file_are_listed_and_looked_into(tmp_path, monkeypatch):
     assert say("inspect", path, "--keys")[1].splitlines()[1] == "/odom (nav_msgs/msg/Odometry, 300 messages)"
 
 
-REAL = [] if not DATA.is_dir() else sorted(path for path in DATA.rglob("*") if path.suffix not in (".md", ".json", ".jsonl"))
+REAL = (
+    []
+    if not DATA.is_dir()
+    else sorted(path for path in DATA.rglob("*") if path.suffix not in (".md", ".json", ".jsonl"))
+)
 
 
 @pytest.mark.skipif(not REAL, reason="the recordings are not part of the project")
@@ -239,7 +255,9 @@ def test_real_recordings_that_can_be_read_can_be_learnt_from(path, tmp_path):
         pytest.skip(f"not read yet: {error}")
     assert found.next is not None, found.notes
     # A humanoid's 26 joints take minutes by default.
-    code, said = run_next(found, tmp_path, *(("--model", "linear", "--risk", "direct") if "lerobot" in str(path) else ()))
+    code, said = run_next(
+        found, tmp_path, *(("--model", "linear", "--risk", "direct") if "lerobot" in str(path) else ())
+    )
     assert code == 0, said
     assert json.loads(say("inspect", path, "--json")[1])["rows"] == found.rows
 

@@ -127,7 +127,9 @@ def _inspect_topics(
         kind = topic[1].split("/")[-1]
         return MOVING_TYPES.index(kind) if kind in MOVING_TYPES else len(MOVING_TYPES)
 
-    listed = [f"topic {name}: {kind}, {count} message{'s' if count != 1 else ''}" for name, kind, count in topics]
+    listed = [
+        f"topic {name}: {kind}, {count} message{'s' if count != 1 else ''}" for name, kind, count in topics
+    ]
     best: Inspection | None = None
     for name, _, count in sorted(topics, key=rank)[:MOST_TOPICS]:
         if not count:
@@ -167,7 +169,7 @@ def _inspect(
     header = first[0].columns()
     names = [column.name for column in header.columns]
     alike = [f for f in found if [column.name for column in f[1][0].columns().columns] == names]
-    files = [file for _, formats, _ in alike for file in formats if file.at_once or sum(file.row_groups)]
+    files = [file for _, formats, _ in alike for file in formats if file.at_once or any(file.row_groups)]
     if not files:
         raise DataError(f"{shown} has no samples")
     looked = look_at(files)
@@ -189,7 +191,9 @@ def _inspect(
         notes += _time_notes(looked.names[clock.place] or f"column {clock.place}", clock, timing, reports)
     if is_guess:
         name = looked.names[episodes[0]]
-        notes.append(f"episodes are told apart by {name}, which changes where the time starts anew; else give --episode")
+        notes.append(
+            f"episodes are told apart by {name}, which changes where the time starts anew; else give --episode"
+        )
     notes += _oddities(reports, looked, codes)
     judged = _Judged(looked, reports, clocks, episodes, codes, topic)
     tried = _try(paths, judged, robot, declared is not None, len(alike) == len(found))
@@ -259,7 +263,9 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
         notes = list(proposal.notes)
         if judged.looked.n_rows <= TRIED_ROWS:
             try:
-                demos = open_recordings(paths, columns=proposal.columns, preparation=proposal.preparation).load()
+                demos = open_recordings(
+                    paths, columns=proposal.columns, preparation=proposal.preparation
+                ).load()
             except UnconstrainError as error:
                 problem = problem or str(error)
                 continue
@@ -354,7 +360,9 @@ def _roles(
     if actions is None and clock is not None:
         window = _shortest_window(clock, judged.codes)
         if window is not None:
-            text = f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
+            text = (
+                f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
+            )
             yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
     # Samples are left out only if the recording cannot be used with them.
     dropping = _with(plain, drop="missing,duplicates,short")
@@ -436,7 +444,9 @@ def _time_notes(name: str, clock: _Clock, timing: Timing, reports: Sequence[Colu
             f"{timing.longest_gap:.3g} s"
         )
     if timing.repeated:
-        notes.append(f"time {called} repeats a stamp at {timing.repeated} step{'s' if timing.repeated != 1 else ''}")
+        notes.append(
+            f"time {called} repeats a stamp at {timing.repeated} step{'s' if timing.repeated != 1 else ''}"
+        )
     if timing.backwards:
         notes.append(
             f"time {called} goes back at {timing.backwards} step{'s' if timing.backwards != 1 else ''}: more than one "
@@ -460,10 +470,14 @@ def _oddities(reports: Sequence[ColumnReport], looked: Looked, codes: Codes) -> 
         which = [_name(report.name, i) for i, report in enumerate(reports) if report.kind == kind]
         if which:
             notes.append(f"{_several(which)}: columns that {what}")
-    lacking = [(_name(r.name, i), r.missing) for i, r in enumerate(reports) if r.missing and r.kind != "empty"]
+    lacking = [
+        (_name(r.name, i), r.missing) for i, r in enumerate(reports) if r.missing and r.kind != "empty"
+    ]
     if lacking:
         total = sum(count for _, count in lacking)
-        notes.append(f"{total} missing value{'s' if total != 1 else ''}, in {_several([n for n, _ in lacking])}")
+        notes.append(
+            f"{total} missing value{'s' if total != 1 else ''}, in {_several([n for n, _ in lacking])}"
+        )
     for i, (report, values) in enumerate(zip(reports, looked.values, strict=True)):
         if report.kind == "angle" and values is not None:
             count, turn = wraps(values)
@@ -499,7 +513,9 @@ def _group_notes(group: Group, groups: Sequence[Group], looked: Looked) -> tuple
     if group.kind == "number":
         listed = _several([_name(looked.names[i], i) for i in group.places])
         notes.append(f"{listed}: taken for the state because they change smoothly; --state overrules this")
-    others = [other for other in groups if other.kind in ("position", "state", "angle") and other is not group]
+    others = [
+        other for other in groups if other.kind in ("position", "state", "angle") and other is not group
+    ]
     if others:
         listed = _several([_name(looked.names[i], i) for other in others for i in other.places])
         notes.append(f"{listed}: left out of the state; --state overrules the choice")

@@ -30,7 +30,18 @@ ANGLE = {
 POSITION = {"x", "y", "z", "tx", "ty", "tz", "px", "py", "pz", "pos", "position", "positions", "xyz"}
 STATE = {"state", "states"}
 ROTATION = {"quat", "quaternion", "orientation", "rotation"}
-NEITHER = {"covariance", "error", "err", "std", "var", "residual", "temperature", "temp", "current", "voltage"}
+NEITHER = {
+    "covariance",
+    "error",
+    "err",
+    "std",
+    "var",
+    "residual",
+    "temperature",
+    "temp",
+    "current",
+    "voltage",
+}
 """Words in the names of columns that say what these are, in small letters."""
 
 UNITS = {

@@ -117,9 +117,7 @@ def look_at(files: Sequence[Format]) -> Looked:
             texts[place] = text
     repeats = [len(rows) for _, rows in parts]
     which = np.repeat([number for number, _ in parts], repeats).astype(np.int64)
-    return Looked(
-        header, tuple(positions), values, texts, units, which, n_rows, tuple(dict.fromkeys(notes))
-    )
+    return Looked(header, tuple(positions), values, texts, units, which, n_rows, tuple(dict.fromkeys(notes)))
 
 
 def _equally_long(header: Header) -> tuple[list[int], list[str]]:

@@ -75,7 +75,9 @@ def choose_time(reports: Sequence[ColumnReport], values: Sequence[Array | None])
         own = values[i]
         if report.kind == "number" and own is not None and not report.missing and len(own) > 2:
             steps = np.diff(own)
-            if np.all(steps > 0) and float(np.median(np.abs(steps - np.median(steps)))) < 0.2 * np.median(steps):
+            if np.all(steps > 0) and float(np.median(np.abs(steps - np.median(steps)))) < 0.2 * np.median(
+                steps
+            ):
                 return [i]
             if i == 0:
                 continue
@@ -105,17 +107,20 @@ def choose_episodes(
     restarts = np.flatnonzero(np.diff(time) < 0)
     if not len(restarts):
         return [], False
-    for i, own in enumerate(values):
-        if own is None or reports[i].kind in ("time", "constant", "empty"):
+    for i, column in enumerate(values):
+        if column is None or reports[i].kind in ("time", "constant", "empty"):
             continue
-        changes = np.flatnonzero(np.diff(own) != 0)
+        changes = np.flatnonzero(np.diff(column) != 0)
         if len(changes) <= 2 * len(restarts) and np.isin(restarts, changes).all():
             return [i], True
     return [], False
 
 
 def choose_states(
-    reports: Sequence[ColumnReport], columns: Sequence[Column], values: Sequence[Array | None], taken: set[int]
+    reports: Sequence[ColumnReport],
+    columns: Sequence[Column],
+    values: Sequence[Array | None],
+    taken: set[int],
 ) -> list[Group]:
     """Find the groups of columns that may be the state, best first.
 

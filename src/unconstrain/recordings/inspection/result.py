@@ -78,7 +78,9 @@ class Inspection:
         rows = [("", "column", "kind", "unit", "values"), *self.table()]
         widths = [max(len(row[i]) for row in rows) for i in range(4)]
         lines = [
-            "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[4]]).rstrip()
+            "  ".join(
+                [*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[4]]
+            ).rstrip()
             for row in rows
         ]
         said = [self.headline(), *lines, *(f"note: {note}" for note in self.notes)]

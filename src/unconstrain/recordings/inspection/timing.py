@@ -91,7 +91,9 @@ def judge_stamps(seconds: Array, episodes: Codes) -> Timing:
     )
 
 
-def explained_by(positions: Array, velocities: Array, seconds: Array, episodes: Codes, over: int = 10) -> float:
+def explained_by(
+    positions: Array, velocities: Array, seconds: Array, episodes: Codes, over: int = 10
+) -> float:
     """Return the share of the squared motion that velocities explain.
 
     Displacements over some samples are compared with the velocities' integral, which noise troubles less than it does
@@ -114,7 +116,9 @@ def explained_by(positions: Array, velocities: Array, seconds: Array, episodes: 
     X, V, t, e = positions[order], velocities[order], seconds[order], episodes[order]
     over = max(1, min(over, len(X) - 1))
     dt = np.diff(t)
-    integral = np.concatenate([np.zeros((1, X.shape[1])), np.cumsum((V[1:] + V[:-1]) / 2 * dt[:, None], axis=0)])
+    integral = np.concatenate(
+        [np.zeros((1, X.shape[1])), np.cumsum((V[1:] + V[:-1]) / 2 * dt[:, None], axis=0)]
+    )
     moved, told = X[over:] - X[:-over], integral[over:] - integral[:-over]
     within = (e[over:] == e[:-over]) & np.isfinite(moved).all(axis=1) & np.isfinite(told).all(axis=1)
     if not within.any():

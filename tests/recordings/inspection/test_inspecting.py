@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import re
 import shlex
 from pathlib import Path
 
@@ -240,7 +241,12 @@ def test_the_tables_of_a_file_are_listed_and_looked_into(tmp_path, monkeypatch):
 REAL = (
     []
     if not DATA.is_dir()
-    else sorted(path for path in DATA.rglob("*") if path.suffix not in (".md", ".json", ".jsonl"))
+    else sorted(
+        path
+        for path in DATA.rglob("*")
+        # Of six episodes that are alike one is enough.
+        if path.suffix not in (".md", ".json", ".jsonl") and not re.search(r"episode_00000[1-5]", path.name)
+    )
 )
 
 

@@ -328,13 +328,20 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
+            refused: list[str] = []
             for actions in choose_actions(group, reports, looked.columns):
                 share, guessed = _agreement(group, actions, clock, judged)
                 if share > AGREES:
                     note = (f"the velocities agree with the positions' derivative to {share:.1%}{guessed}",)
                     yield from _roles(judged, group, actions, clock, (*notes, *note))
+                elif clock is not None:
+                    listed = _several([_name(looked.names[i], i) for i in actions.places])
+                    refused.append(
+                        f"{listed}: no derivative of the positions (of whose motion they explain "
+                        f"{max(share, 0.0):.0%}), so the states are differentiated; --action overrules this"
+                    )
             if clock is not None:
-                yield from _roles(judged, group, None, clock, notes)
+                yield from _roles(judged, group, None, clock, (*notes, *refused))
 
 
 def _roles(
@@ -433,7 +440,7 @@ def _time_notes(name: str, clock: _Clock, timing: Timing, reports: Sequence[Colu
     called = repr(name)
     if math.isclose(timing.step, 1.0, rel_tol=1e-12) and clock.unit == "s" and timing.even:
         notes.append(
-            f"time {called} goes on in steps of exactly 1, read as seconds: if these are milliseconds or frame numbers, "
+            f"time {called} goes on in steps of exactly 1, read as seconds: if these are milliseconds or frames, "
             "give --time-unit or another --time"
         )
     elif clock.unit != "s" and not clock.is_typed:

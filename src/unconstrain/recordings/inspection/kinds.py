@@ -270,7 +270,7 @@ def _judge_one(name: str, values: Array, unit: str | None) -> ColumnReport:
     if NEITHER & set(called):
         return report
     count, turn = wraps(values)
-    kind = "angle" if count else _kind_by_name(called, [w for w in called if not w.isdecimal()])
+    kind = "angle" if count else _kind_by_name(called)
     if kind == "angle":
         known = unit_of(name, "angle")
         by_turn = {0.0: None, 360.0: "deg"}.get(turn, "rad")
@@ -285,8 +285,11 @@ def _is_piecewise(here: Array) -> bool:
     return len(here) < 3 or float(np.mean(np.diff(here) != 0)) < 0.34
 
 
-def _kind_by_name(called: Sequence[str], letters: Sequence[str]) -> str:
+def _kind_by_name(called: Sequence[str]) -> str:
     """Judge by the words of a name; of `linear.velocity.x` and `pose.position.x` the words before the axis decide."""
+    letters = [word for word in called if not word.isdecimal()]
+    if len(letters) > 1 and letters[-1] in UNITS:
+        letters.pop()
     for kind, known in (
         ("acceleration", ACCELERATION),
         ("velocity", VELOCITY),
@@ -300,4 +303,4 @@ def _kind_by_name(called: Sequence[str], letters: Sequence[str]) -> str:
         return "angle" if {"joint", "joints"} & set(letters) else "position"
     if letters and letters[-1] in POSITION:
         return "position"
-    return "angle" if ANGLE & set(letters) and called else "number"
+    return "angle" if ANGLE & set(letters) else "number"

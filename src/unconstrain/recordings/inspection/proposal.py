@@ -143,9 +143,10 @@ def choose_states(
     for kind in ("position", "state", "angle"):
         found: dict[str, list[int]] = {}
         for i, report in enumerate(reports):
-            is_state = report.kind in ("number", "angle", "position") and STATE & set(words(report.name))
-            own = "state" if is_state else report.kind
-            if own == kind and i not in taken and not ACTIONS & set(words(report.name)):
+            called = set(words(report.name))
+            is_state = report.kind in ("number", "angle", "position") and bool(STATE & called)
+            judged = "state" if is_state else report.kind
+            if judged == kind and i not in taken and not ACTIONS & called:
                 found.setdefault(_stem(columns[i], kind), []).append(i)
         groups += _in_order(kind, found, reports)
     numbers = [

@@ -106,36 +106,57 @@ def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
     file = open_formats(paths, Columns())[0][1][0]
     topics = _topics(file)
     if topics:
-        return [f"{name} ({kind}, {count} messages)" for name, kind, count in topics]
+        return [str(topic) for topic in topics]
     header = file.columns()
     listed = [column.name or f"column {i}" for i, column in enumerate(header.columns)]
     return [*listed, *(f"{name} ({why})" for name, why in header.unusable.items())]
 
 
-def _topics(file: Format) -> list[tuple[str, str, int]]:
-    """Return the tables of a file that holds several; the capability is optional."""
-    ask = getattr(file, "topics", None)
-    return list(ask()) if ask is not None and hasattr(file, "for_topics") else []
+@dataclass(frozen=True)
+class _Topic:
+    """One of the tables of a file: its name, and the kind and number of its messages where they are known."""
 
+    name: str
+    kind: str = ""
+    count: int | None = None
 
-def _inspect_topics(
-    paths: list[Any], shown: str, file: Any, topics: list[tuple[str, str, int]]
-) -> Inspection:
-    """Look into each table of a file, and take the first that holds a movement."""
+    def __str__(self) -> str:
+        if self.count is None:
+            return self.name
+        return f"{self.name} ({self.kind}, {self.count} message{'' if self.count == 1 else 's'})"
 
-    def rank(topic: tuple[str, str, int]) -> int:
-        kind = topic[1].split("/")[-1]
+    @property
+    def rank(self) -> int:
+        """How soon it is looked at."""
+        kind = self.kind.split("/")[-1]
         return MOVING_TYPES.index(kind) if kind in MOVING_TYPES else len(MOVING_TYPES)
 
-    listed = [
-        f"topic {name}: {kind}, {count} message{'s' if count != 1 else ''}" for name, kind, count in topics
-    ]
+
+def _topics(file: Format) -> list[_Topic]:
+    """Return the tables of a file that holds several, the likeliest to hold a movement first.
+
+    A format may list them with `topics()`, by name, kind and count, or with `topics_of_movement()`, by name alone.
+    """
+    if not hasattr(file, "for_topics"):
+        return []
+    ask = getattr(file, "topics", None)
+    if callable(ask):
+        return sorted((_Topic(*topic) for topic in ask()), key=lambda topic: topic.rank)
+    ask = getattr(file, "topics_of_movement", None)
+    return [_Topic(name) for name in ask()] if callable(ask) else []
+
+
+def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic]) -> Inspection:
+    """Look into each table of a file, and take the first that holds a movement."""
+
+    listed = [f"topic {topic}" for topic in topics]
     best: Inspection | None = None
-    for name, _, count in sorted(topics, key=rank)[:MOST_TOPICS]:
-        if not count:
+    for topic in topics[:MOST_TOPICS]:
+        if topic.count == 0:
             continue
+        name = topic.name
         try:
-            one = _inspect(paths, [(shown, [file.for_topics([name])], None)], None, name)
+            one = _inspect(paths, [(shown, [file.for_topics((name,))], None)], None, name)
         except UnconstrainError as error:
             listed.append(f"topic {name} was not looked into: {error}")
             continue
@@ -180,6 +201,7 @@ def _inspect(
     called = [_called(column.name, column.part_of, column.component, robot) for column in looked.columns]
     reports = judge(called, looked.values, looked.units)
     declared = first[0].declared()
+    knows = declared is not None and declared.columns.state is not None
     clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values)]
     clock = clocks[0] if clocks else None
     rising = None if clock is None or len(alike) > 1 else clock.seconds
@@ -196,7 +218,7 @@ def _inspect(
         )
     notes += _oddities(reports, looked, codes)
     judged = _Judged(looked, reports, clocks, episodes, codes, topic)
-    tried = _try(paths, judged, robot, declared is not None, len(alike) == len(found))
+    tried = _try(paths, judged, robot, knows, len(alike) == len(found))
     notes += tried.notes
     reports = [replace(report, name=name) for report, name in zip(tried.reports, looked.names, strict=True)]
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
@@ -261,6 +283,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
         if number >= MOST_TRIED:
             break
         notes = list(proposal.notes)
+        known = {*judged.looked.notes, *notes}
         if judged.looked.n_rows <= TRIED_ROWS:
             try:
                 demos = open_recordings(
@@ -269,7 +292,9 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
             except UnconstrainError as error:
                 problem = problem or str(error)
                 continue
-            notes += [str(note) for note in demos.notes]
+            notes += [
+                note for note in demos.notes if note not in known and note.partition(": ")[2] not in known
+            ]
         else:
             notes.append("the command was not tried, as there is much to read")
         reports = [

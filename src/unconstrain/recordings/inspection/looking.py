@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.formats.base import GUESS, ColumnKey, Format
-from unconstrain.recordings.notes import Note
 from unconstrain.recordings.table import Cells, Column, Header, is_text
 
 Array = NDArray[np.float64]
@@ -101,7 +100,7 @@ def look_at(files: Sequence[Format]) -> Looked:
             left -= len(rows)
             guess = (rows.schema.metadata or {}).get(GUESS)
             if guess is not None:
-                notes.append(str(Note("guess", "", guess.decode())))
+                notes += guess.decode().splitlines()
     looked = sum(len(rows) for _, rows in parts)
     if looked < n_rows:
         notes.append(f"only the first {looked} of {n_rows} rows were looked at")

@@ -148,7 +148,7 @@ def choose_states(
             judged = "state" if is_state else report.kind
             if judged == kind and i not in taken and not ACTIONS & called:
                 found.setdefault(_stem(columns[i], kind), []).append(i)
-        groups += _in_order(kind, found, reports)
+        groups += _in_order(kind, _runs(found, columns), reports)
     numbers = [
         i
         for i, report in enumerate(reports)
@@ -221,6 +221,19 @@ def _stem(column: Column, kind: str) -> str:
     while called and (called[-1].isdecimal() or (len(called[-1]) <= 2 and len(called) > 1)):
         called = called[:-1]
     return " ".join(called) if len(called) > 1 else ""
+
+
+def _runs(found: dict[str, list[int]], columns: Sequence[Column]) -> dict[str, list[int]]:
+    """Split the columns of an array where others lie between them, as a quaternion between a position and a force."""
+    runs: dict[str, list[int]] = {}
+    for stem, places in found.items():
+        last = None
+        for i in places:
+            if last is None or (columns[i].part_of and i != last + 1):
+                run = f"{stem} from {i}"
+            runs.setdefault(run, []).append(i)
+            last = i
+    return runs
 
 
 def _in_order(kind: str, found: dict[str, list[int]], reports: Sequence[ColumnReport]) -> list[Group]:

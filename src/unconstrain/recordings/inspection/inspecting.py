@@ -148,7 +148,6 @@ def _topics(file: Format) -> list[_Topic]:
 
 def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic]) -> Inspection:
     """Look into each table of a file, and take the first that holds a movement."""
-
     listed = [f"topic {topic}" for topic in topics]
     best: Inspection | None = None
     for topic in topics[:MOST_TOPICS]:
@@ -283,7 +282,6 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
         if number >= MOST_TRIED:
             break
         notes = list(proposal.notes)
-        known = {*judged.looked.notes, *notes}
         if judged.looked.n_rows <= TRIED_ROWS:
             try:
                 demos = open_recordings(
@@ -292,9 +290,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
             except UnconstrainError as error:
                 problem = problem or str(error)
                 continue
-            notes += [
-                note for note in demos.notes if note not in known and note.partition(": ")[2] not in known
-            ]
+            notes += demos.notes
         else:
             notes.append("the command was not tried, as there is much to read")
         reports = [
@@ -302,7 +298,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
             for i, report in enumerate(judged.reports)
         ]
         return _Tried(fit_command(paths, proposal.columns, proposal.preparation), notes, reports)
-    return _Tried(None, [_why_none(judged, problem)], judged.reports)
+    return _Tried(None, [*judged.looked.guesses, _why_none(judged, problem)], judged.reports)
 
 
 def _why_none(judged: _Judged, problem: str) -> str:

@@ -41,7 +41,9 @@ class Looked:
     n_rows : int
         How many rows there are, of which these may be the first.
     notes : tuple of str
-        What was guessed in reading, and what was left out.
+        What was left out.
+    guesses : tuple of str
+        What the format guessed of all columns, those that nobody chooses among them.
     """
 
     header: Header
@@ -52,6 +54,7 @@ class Looked:
     files: NDArray[np.int64]
     n_rows: int
     notes: tuple[str, ...]
+    guesses: tuple[str, ...] = ()
 
     @property
     def columns(self) -> list[Column]:
@@ -92,6 +95,7 @@ def look_at(files: Sequence[Format]) -> Looked:
     most = min(MOST_ROWS, max(MOST_CELLS // len(columns), 1000))
     n_rows = sum(sum(each.row_groups) for each in files)
     parts: list[tuple[int, pa.RecordBatch]] = []
+    guesses: list[str] = []
     left = most
     for number, file in enumerate(files):
         stop = None if file.at_once else min(left, sum(file.row_groups))
@@ -100,7 +104,7 @@ def look_at(files: Sequence[Format]) -> Looked:
             left -= len(rows)
             guess = (rows.schema.metadata or {}).get(GUESS)
             if guess is not None:
-                notes += guess.decode().splitlines()
+                guesses += guess.decode().splitlines()
     looked = sum(len(rows) for _, rows in parts)
     if looked < n_rows:
         notes.append(f"only the first {looked} of {n_rows} rows were looked at")
@@ -116,7 +120,17 @@ def look_at(files: Sequence[Format]) -> Looked:
             texts[place] = text
     repeats = [len(rows) for _, rows in parts]
     which = np.repeat([number for number, _ in parts], repeats).astype(np.int64)
-    return Looked(header, tuple(positions), values, texts, units, which, n_rows, tuple(dict.fromkeys(notes)))
+    return Looked(
+        header,
+        tuple(positions),
+        values,
+        texts,
+        units,
+        which,
+        n_rows,
+        tuple(notes),
+        tuple(dict.fromkeys(guesses)),
+    )
 
 
 def _equally_long(header: Header) -> tuple[list[int], list[str]]:

@@ -15,7 +15,7 @@ FILES = (".parquet", ".pq", ".npz")
 
 
 @command(
-    short_help="Write recordings of any format as Parquet or as a LeRobot dataset.",
+    short_help="Write recordings as Parquet or as a LeRobot dataset.",
     epilog="For example:\n\n\b\nunconstrain convert wipe.csv --state x,y,z --time t --episode run --out wipe.parquet",
 )
 @recordings.recorded

@@ -8,7 +8,7 @@ from unconstrain.progress import working
 
 
 @command(
-    short_help="Show what is in a recording, and how to learn from it.",
+    short_help="Show what is in a recording, and what to type next.",
     epilog="For example:\n\n\b\nunconstrain inspect wipe.csv",
 )
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")

@@ -11,6 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import unconstrain as uc
 from unconstrain.cli.app import run
@@ -281,3 +283,26 @@ def test_the_demos_own_recordings(tmp_path):
             assert "--state x1,x2 --action u1,u2" in found.next
             assert "--episode episode" in found.next
             assert run_next(found, tmp_path)[0] == 0
+
+
+ODD = [0.0, -0.0, 1.0, 1e308, -1e308, 1e-320, np.nan, np.inf, 1.7e18, 360.0]
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(
+        st.sampled_from(["t", "x", "y", "qx", "run", "frame", "u1", "vx", "", "a\x1b", "yaw"]),
+        min_size=1,
+        max_size=6,
+    ),
+    st.integers(1, 12),
+    st.integers(0, 10**6),
+)
+def test_whatever_numbers_are_in_a_table_there_is_an_answer_or_a_sentence(tmp_path, names, n, seed):
+    rng = np.random.default_rng(seed)
+    rows = [",".join(str(v) for v in rng.choice(ODD, len(names))) for _ in range(n)]
+    path = tmp_path / "odd.csv"
+    path.write_text("\n".join([",".join(names), *rows]) + "\n")
+    code, said = say("inspect", path, "--json")
+    assert code in (0, 2)
+    assert code == 2 or set(json.loads(said)) >= {"rows", "next"}

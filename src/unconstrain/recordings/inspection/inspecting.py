@@ -80,9 +80,10 @@ def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -
     found = open_formats(paths, Columns())
     shown, files, robot = found[0]
     topics = _topics(files[0])
-    if topics:
-        return _inspect_topics(paths, shown, files[0], topics)
-    return _inspect(paths, found, robot, None)
+    with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
+        if topics:
+            return _inspect_topics(paths, shown, files[0], topics)
+        return _inspect(paths, found, robot, None)
 
 
 def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[str]:

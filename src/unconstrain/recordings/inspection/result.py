@@ -15,6 +15,7 @@ class Inspection:
     source : str
         What was looked at.
     rows : int
+        How many samples there are.
     episodes : int
         As an episode column or the files tell them apart.
     rate_hz : float or None
@@ -22,6 +23,7 @@ class Inspection:
     duration_s : float or None
         Of all episodes together.
     columns : tuple of ColumnReport
+        In their order.
     notes : tuple of str
         What is odd, what was guessed, and why there is no command, if there is none.
     next : str or None
@@ -57,7 +59,7 @@ class Inspection:
             "next": self.next,
         }
 
-    def headline(self) -> str:
+    def _headline(self) -> str:
         """Say in one line how much there is."""
         told = [f"{self.rows} rows", f"{self.episodes} episode{'' if self.episodes == 1 else 's'}"]
         if self.rate_hz is not None:
@@ -66,7 +68,7 @@ class Inspection:
             told.append(f"{self.duration_s:.4g} s")
         return f"{self.source}: {', '.join(told)}"
 
-    def table(self) -> list[tuple[str, str, str, str, str]]:
+    def _table(self) -> list[tuple[str, str, str, str, str]]:
         """Return a row for each column: position, name, kind, unit and what else there is to say."""
         return [
             (str(i), column.name, column.kind, column.unit or "", _details(column))
@@ -75,7 +77,7 @@ class Inspection:
 
     def __str__(self) -> str:
         """Return all of it as text."""
-        rows = [("", "column", "kind", "unit", "values"), *self.table()]
+        rows = [("", "column", "kind", "unit", "values"), *self._table()]
         widths = [max(len(row[i]) for row in rows) for i in range(4)]
         lines = [
             "  ".join(
@@ -83,7 +85,7 @@ class Inspection:
             ).rstrip()
             for row in rows
         ]
-        said = [self.headline(), *lines, *(f"note: {note}" for note in self.notes)]
+        said = [self._headline(), *lines, *(f"note: {note}" for note in self.notes)]
         return "\n".join(said if self.next is None else [*said, "next:", f"  {self.next}"])
 
 

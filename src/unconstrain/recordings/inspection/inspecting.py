@@ -14,7 +14,14 @@ from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.formats.base import Format
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
 from unconstrain.recordings.inspection.command import fit_command
-from unconstrain.recordings.inspection.kinds import ColumnReport, epoch_unit, judge, sign_flips, wraps
+from unconstrain.recordings.inspection.kinds import (
+    ColumnReport,
+    epoch_unit,
+    judge,
+    sign_flips,
+    tells_episodes,
+    wraps,
+)
 from unconstrain.recordings.inspection.looking import Looked, look_at
 from unconstrain.recordings.inspection.proposal import (
     Group,
@@ -200,6 +207,12 @@ def _inspect(
         notes.append(f"{others} has other columns than {shown}, so that one `fit` cannot read both")
     called = [_called(column.name, column.part_of, column.component, robot) for column in looked.columns]
     reports = judge(called, looked.values, looked.units)
+    reports = [
+        replace(report, kind="episode")
+        if i in looked.texts and tells_episodes(report.name, looked.texts[i])
+        else report
+        for i, report in enumerate(reports)
+    ]
     declared = first[0].declared()
     knows = declared is not None and declared.columns.state is not None
     clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values)]

@@ -63,6 +63,9 @@ FITTING = {
 EPOCHS = ((1e9, 4e9, "s"), (1e12, 4e12, "ms"), (1e15, 4e15, "us"), (1e18, 4e18, "ns"))
 """Seconds since 1970 of the years 2001 to 2096, in each unit."""
 
+SELDOM = 0.34
+"""Columns that change at a larger share of the steps do not tell episodes apart."""
+
 UNIT_NORM = 0.02
 """How far from one the norm of a recorded quaternion may be."""
 
@@ -226,6 +229,13 @@ def epoch_unit(values: Array) -> str | None:
     return next((unit for low, high, unit in EPOCHS if low <= middle < high), None)
 
 
+def tells_episodes(name: str, texts: NDArray[np.str_]) -> bool:
+    """Whether a column of text is called after episodes and changes seldom."""
+    return bool(EPISODE & set(words(name))) and bool(
+        np.mean(texts[1:] != texts[:-1]) < SELDOM if len(texts) > 1 else True
+    )
+
+
 def _may_be_one(called: Sequence[Sequence[str]], letters: str) -> bool:
     """Whether the names of four columns allow that they are a quaternion; `x, y, vx, vy` do not."""
     alike = all(own[:-1] == called[0][:-1] for own in called)
@@ -282,7 +292,7 @@ def _judge_one(name: str, values: Array, unit: str | None) -> ColumnReport:
 
 def _is_piecewise(here: Array) -> bool:
     """Whether values change seldom, so that they can tell episodes apart."""
-    return len(here) < 3 or float(np.mean(np.diff(here) != 0)) < 0.34
+    return len(here) < 3 or float(np.mean(np.diff(here) != 0)) < SELDOM
 
 
 def _kind_by_name(called: Sequence[str]) -> str:

@@ -127,6 +127,16 @@ def test_the_size_of_an_epoch_tells_the_unit(tmp_path, unit, ticks, epoch):
     assert f"--time-unit {unit}" in found.next
 
 
+def test_episodes_may_be_called_by_text(tmp_path):
+    t, phase = circles(100)
+    t, phase, names = np.tile(t, 3), np.tile(phase, 3), np.repeat(["demo_0", "demo_1", "demo_2"], 100)
+    found = uc.inspect(write(tmp_path / "a.csv", demo=names, t=t, x=np.cos(phase), y=np.sin(phase)))
+    assert found.episodes == 3
+    assert found.columns[0].kind == "episode"
+    assert "--episode demo" in found.next
+    assert run_next(found, tmp_path)[0] == 0
+
+
 def test_oddities_are_noted(tmp_path):
     t, phase = circles()
     t = t.copy()

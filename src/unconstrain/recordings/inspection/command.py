@@ -37,14 +37,13 @@ def fit_command(paths: Sequence[str | os.PathLike[str]], columns: Columns, prepa
         for field in fields(carrier):
             value = getattr(carrier, field.name)
             if value is not None and value != field.default:
-                parts += [f"--{field.name.replace('_', '-')}", shlex.quote(_written(value))]
+                written = _written(value) if carrier is columns else str(value)
+                parts += [f"--{field.name.replace('_', '-')}", shlex.quote(written)]
     return " ".join([*parts, "--out", _path(_output(os.fspath(paths[0])))])
 
 
 def _written(value: Any) -> str:
-    """Write an option's value as the program reads it: columns as a line of CSV."""
-    if isinstance(value, float):
-        return f"{value:g}"
+    """Write columns as the program reads them: as a line of CSV."""
     each = [value] if isinstance(value, str | int) else list(value)
     line = io.StringIO()
     csv.writer(line, lineterminator="").writerow(each)

@@ -555,11 +555,10 @@ def _group_notes(group: Group, groups: Sequence[Group], looked: Looked) -> tuple
     if group.kind == "number":
         listed = _several([_name(looked.names[i], i) for i in group.places])
         notes.append(f"{listed}: taken for the state because they change smoothly; --state overrules this")
-    others = [
-        other for other in groups if other.kind in ("position", "state", "angle") and other is not group
-    ]
+    named = [other.places for other in groups if other.kind in ("position", "state", "angle")]
+    others = sorted({i for places in named for i in places} - set(group.places))
     if others:
-        listed = _several([_name(looked.names[i], i) for other in others for i in other.places])
+        listed = _several([_name(looked.names[i], i) for i in others])
         notes.append(f"{listed}: left out of the state; --state overrules the choice")
     return tuple(notes)
 

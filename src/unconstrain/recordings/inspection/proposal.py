@@ -237,12 +237,16 @@ def _runs(found: dict[str, list[int]], columns: Sequence[Column]) -> dict[str, l
 
 
 def _in_order(kind: str, found: dict[str, list[int]], reports: Sequence[ColumnReport]) -> list[Group]:
-    groups = []
+    """Make groups of columns: whole ones first, then those with missing values, then what is left of these without."""
+    limit = MOST_STATES if kind == "number" else None
+    ranked: list[tuple[int, Group]] = []
     for stem, places in found.items():
-        whole = [i for i in places if not reports[i].missing] or places
-        limit = MOST_STATES if kind == "number" else None
-        groups.append(Group(kind, tuple(_axes(whole, reports)[:limit]), stem))
-    return sorted(groups, key=lambda group: any(reports[i].missing for i in group.places))
+        own = _axes(places, reports)[:limit]
+        whole = [i for i in own if not reports[i].missing]
+        ranked.append((0 if len(whole) == len(own) else 1, Group(kind, tuple(own), stem)))
+        if 0 < len(whole) < len(own):
+            ranked.append((2, Group(kind, tuple(whole), stem)))
+    return [group for _, group in sorted(ranked, key=lambda pair: pair[0])]
 
 
 def _axes(places: list[int], reports: Sequence[ColumnReport]) -> list[int]:

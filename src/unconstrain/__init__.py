@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
     from unconstrain.fitting import moments
     from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
-    from unconstrain.recordings import Columns, Preparation, Recordings, load, open
+    from unconstrain.recordings import Columns, Inspection, Preparation, Recordings, inspect, load, open
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
     from unconstrain.selection import select_policy
@@ -40,6 +40,7 @@ __all__ = [
     "DecoupledFeatures",
     "Demonstrations",
     "FeatureConstraint",
+    "Inspection",
     "LocallyLinearPolicy",
     "NormalizedRBF",
     "NullspaceComponent",
@@ -53,6 +54,7 @@ __all__ = [
     "features",
     "fit_stream",
     "identifiability",
+    "inspect",
     "load",
     "load_compiled",
     "load_constraint",
@@ -77,7 +79,15 @@ _HOMES = {
     "unconstrain.diagnostics": ("identifiability",),
     "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
     "unconstrain.policies": ("LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"),
-    "unconstrain.recordings": ("Columns", "Preparation", "Recordings", "load", "open"),
+    "unconstrain.recordings": (
+        "Columns",
+        "Inspection",
+        "Preparation",
+        "Recordings",
+        "inspect",
+        "load",
+        "open",
+    ),
     "unconstrain.scaling.stream": ("fit_stream",),
     "unconstrain.selection": ("select_policy",),
     "unconstrain.version": ("__version__",),

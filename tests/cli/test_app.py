@@ -24,11 +24,13 @@ def test_help_lists_each_command_with_one_whole_line(run, monkeypatch):
     listed = out.split("Commands:\n")[1].strip("\n").splitlines()
     assert [line.split()[0] for line in listed] == [
         "demo",
+        "inspect",
         "fit",
         "evaluate",
         "diagnose",
         "constraints",
         "rollout",
+        "convert",
     ]
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
     code, shown, err = run()

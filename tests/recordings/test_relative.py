@@ -97,7 +97,10 @@ def test_a_circle_about_a_centre_that_wanders_becomes_one_about_the_origin(tmp_p
     [
         ({"relative_to": ["gx"]}, "one column for each of the 2 states"),
         ({"relative_to": ["gx", "gz"]}, "gz"),
-        ({"relative_to": ["gx", "gy"], "time": None, "action": ["x", "y"]}, "relative_to needs to know the time"),
+        (
+            {"relative_to": ["gx", "gy"], "time": None, "action": ["x", "y"]},
+            "relative_to needs to know the time",
+        ),
         ({"moving_centre": 0.5, "time": None, "action": ["x", "y"]}, "moving_centre"),
         ({"moving_centre": -1.0}, "moving_centre must be a positive number"),
     ],

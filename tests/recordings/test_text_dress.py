@@ -96,7 +96,9 @@ def test_compressed_text(tmp_path, compress):
 
 def test_numbers_that_name_columns(tmp_path):
     demos = read(tmp_path, table("0,1,2"), state=["1", "2"], time="0")
-    assert demos.notes[:-1] == ("a.csv: the numbers 0, 1, 2 in line 1 are taken for the names of the columns",)
+    assert demos.notes[:-1] == (
+        "a.csv: the numbers 0, 1, 2 in line 1 are taken for the names of the columns",
+    )
     read(tmp_path, table("2019,2020,2021"), state=[2020, 2021], time="2019")
     read(tmp_path, table("t,2020,2021"), state=["2020", "2021"], time="t")
     read(tmp_path, table("t,0,1"), state=[0, 1], time="t")

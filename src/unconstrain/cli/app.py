@@ -8,10 +8,12 @@ import unconstrain
 from unconstrain.cli import reporting
 from unconstrain.cli.command import Group, Interrupted
 from unconstrain.cli.constraints import constraints
+from unconstrain.cli.convert import convert
 from unconstrain.cli.demo import demo
 from unconstrain.cli.diagnose import diagnose
 from unconstrain.cli.evaluate import evaluate
 from unconstrain.cli.fit import fit
+from unconstrain.cli.inspect import inspect
 from unconstrain.cli.rollout import rollout
 
 WIDTH = 100
@@ -37,7 +39,7 @@ def program() -> None:
     """Learn the policy behind constrained demonstrations."""
 
 
-for command in (demo, fit, evaluate, diagnose, constraints, rollout):
+for command in (demo, inspect, fit, evaluate, diagnose, constraints, rollout, convert):
     program.add_command(command)
 
 

@@ -64,9 +64,9 @@ def fit(
 ) -> None:
     """Learn the unconstrained policy behind recordings, and save it.
 
-    FILES are recordings in text, NPZ, NPY, MATLAB, HDF5, C3D, XLSX or Parquet files, folders of Parquet files, ROS bags, or
-    LeRobot datasets, here or at URIs such as s3://bucket/folder. What does not fit into memory, and what has a --checkpoint or
-    a --cluster, is read as a stream: without a comparison with ordinary regression.
+    FILES are recordings in text, NPZ, NPY, MATLAB, HDF5, C3D, XLSX or Parquet files, folders of Parquet files, ROS
+    bags, or LeRobot datasets, here or at URIs such as s3://bucket/folder. What does not fit into memory, and what has a
+    --checkpoint or a --cluster, is read as a stream: without a comparison with ordinary regression.
     """
     outputs.check_outputs(
         recorded.files,

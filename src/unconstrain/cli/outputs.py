@@ -89,6 +89,17 @@ def check_outputs(
         check_new(path, name, overwrite=overwrite or name in continued)
 
 
+def check_apart(inputs: Sequence[str | os.PathLike[str]], folder: Path) -> None:
+    """Raise `UnconstrainError` for a folder to be written that is read, holds what is read, or lies within it."""
+    real = _real(folder)
+    for path in (_real(path) for each in inputs for path in _expanded(each)):
+        parts = (path, real)
+        if path == real or any(a.startswith(os.path.join(b, "")) for a, b in (parts, parts[::-1])):
+            raise DataError(
+                f"{folder} holds what is read, or lies in a folder that is read: choose another name for out="
+            )
+
+
 def check_new(path: Path, name: str, *, overwrite: bool) -> None:
     """Raise `UnconstrainError` for a file that cannot be written, or that exists and must not be replaced."""
     atomic.check_writable(path)

@@ -7,15 +7,27 @@ from unconstrain import lazy
 if TYPE_CHECKING:
     from unconstrain.recordings.columns import Columns
     from unconstrain.recordings.derivative import differentiate
+    from unconstrain.recordings.inspection import Inspection, inspect
     from unconstrain.recordings.notes import Note
     from unconstrain.recordings.preparation import Preparation
     from unconstrain.recordings.source import Recordings, load, open
 
-__all__ = ["Columns", "Note", "Preparation", "Recordings", "differentiate", "load", "open"]
+__all__ = [
+    "Columns",
+    "Inspection",
+    "Note",
+    "Preparation",
+    "Recordings",
+    "differentiate",
+    "inspect",
+    "load",
+    "open",
+]
 
 _HOMES = {
     "unconstrain.recordings.columns": ("Columns",),
     "unconstrain.recordings.derivative": ("differentiate",),
+    "unconstrain.recordings.inspection": ("Inspection", "inspect"),
     "unconstrain.recordings.notes": ("Note",),
     "unconstrain.recordings.preparation": ("Preparation",),
     "unconstrain.recordings.source": ("Recordings", "load", "open"),

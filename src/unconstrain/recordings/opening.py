@@ -222,6 +222,35 @@ def _with_kind(recordings: tuple[Recording, ...], given: str | None) -> tuple[Re
     return tuple(every)
 
 
+def open_formats(
+    paths: list[str | os.PathLike[str]], columns: Columns
+) -> list[tuple[str, list[Format], LeRobot | None]]:
+    """Find the files of each recording and their formats, without asking which column is what.
+
+    Parameters
+    ----------
+    paths : list of path
+        Files, folders, patterns and URIs.
+    columns : Columns
+        As given; they decide whether a folder of saved demonstrations is one recording.
+
+    Returns
+    -------
+    list of (str, list of Format, LeRobot or None)
+        What the user calls it, its files, and the dataset that it is, if any.
+
+    Raises
+    ------
+    DataError
+        There are no such files, or they are of no known format.
+    """
+    return [
+        (shown, [_open_file((file, robot is not None or len(files) > 1)) for file in files], robot)
+        for place in locate(paths)
+        for shown, files, robot in _recordings_of(place, columns)
+    ]
+
+
 def _open_file(about: tuple[File, bool]) -> Format:
     file, in_folder = about
     opened = recognize(file)

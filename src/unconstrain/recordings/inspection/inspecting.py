@@ -1,0 +1,598 @@
+"""Looking at a recording of any format without being told what its columns are."""
+
+import math
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.recordings.columns import DIFFERENTIATE, Columns
+from unconstrain.recordings.formats.base import Format
+from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
+from unconstrain.recordings.inspection.command import fit_command
+from unconstrain.recordings.inspection.kinds import (
+    ColumnReport,
+    epoch_unit,
+    judge,
+    sign_flips,
+    tells_episodes,
+    wraps,
+)
+from unconstrain.recordings.inspection.looking import Looked, look_at
+from unconstrain.recordings.inspection.proposal import (
+    Group,
+    choose_actions,
+    choose_episodes,
+    choose_states,
+    choose_time,
+    key_of,
+    keys_of,
+)
+from unconstrain.recordings.inspection.result import Inspection
+from unconstrain.recordings.inspection.timing import Timing, explained_by, judge_stamps
+from unconstrain.recordings.opening import open_formats
+from unconstrain.recordings.preparation import TIME_UNITS, Preparation
+from unconstrain.recordings.source import open as open_recordings
+
+Array = NDArray[np.float64]
+Codes = NDArray[np.int64]
+
+AGREES = 0.7
+"""The share of the motion that velocities must explain to be taken for the derivative of positions."""
+
+MOST_TRIED = 12
+"""Proposals that are tried before it is said that there is no movement."""
+
+TRIED_ROWS = 3_000_000
+"""Rows of files that are read to try a proposal; of more, it is proposed without."""
+
+NANOSECOND_STEP = 1e5
+"""Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
+
+MOVING_TYPES = ("Odometry", "PoseStamped", "JointState", "TransformStamped", "Pose", "Path", "Twist")
+"""The kinds of messages that are looked at first, where a file holds several tables."""
+
+MOST_TOPICS = 30
+"""Tables of one file that are looked into."""
+
+
+def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> Inspection:
+    """Look at recordings, and find the command that learns from them.
+
+    Parameters
+    ----------
+    source : path, pattern, URI, or several of them
+        Files of any format that `open` reads.
+
+    Returns
+    -------
+    Inspection
+        Its `next` was tried: `open` reads the files with these columns.
+
+    Raises
+    ------
+    DataError
+        There is no such file, or it cannot be read.
+
+    Examples
+    --------
+    >>> import unconstrain as uc
+    >>> print(uc.inspect("wipe.csv"))  # doctest: +SKIP
+    """
+    paths = [source] if isinstance(source, str | os.PathLike) else list(source)
+    found = open_formats(paths, Columns())
+    shown, files, robot = found[0]
+    topics = _topics(files[0])
+    with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
+        if topics:
+            return _inspect_topics(paths, shown, files[0], topics)
+        return _inspect(paths, found, robot, None)
+
+
+def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[str]:
+    """List the columns that there are, or, of a file that holds several tables, these.
+
+    Parameters
+    ----------
+    source : path, pattern, URI, or several of them
+
+    Returns
+    -------
+    list of str
+        One line each; positions in place of names that are missing.
+
+    Raises
+    ------
+    DataError
+        There is no such file, or it cannot be read.
+    """
+    paths = [source] if isinstance(source, str | os.PathLike) else list(source)
+    file = open_formats(paths, Columns())[0][1][0]
+    topics = _topics(file)
+    if topics:
+        return [str(topic) for topic in topics]
+    header = file.columns()
+    listed = [column.name or f"column {i}" for i, column in enumerate(header.columns)]
+    return [*listed, *(f"{name} ({why})" for name, why in header.unusable.items())]
+
+
+@dataclass(frozen=True)
+class _Topic:
+    """One of the tables of a file: its name, and the kind and number of its messages where they are known."""
+
+    name: str
+    kind: str = ""
+    count: int | None = None
+
+    def __str__(self) -> str:
+        if self.count is None:
+            return self.name
+        return f"{self.name} ({self.kind}, {self.count} message{'' if self.count == 1 else 's'})"
+
+    @property
+    def rank(self) -> int:
+        """How soon it is looked at."""
+        kind = self.kind.split("/")[-1]
+        return MOVING_TYPES.index(kind) if kind in MOVING_TYPES else len(MOVING_TYPES)
+
+
+def _topics(file: Format) -> list[_Topic]:
+    """Return the tables of a file that holds several, the likeliest to hold a movement first.
+
+    A format may list them with `topics()`, by name, kind and count, or with `topics_of_movement()`, by name alone.
+    """
+    if not hasattr(file, "for_topics"):
+        return []
+    ask = getattr(file, "topics", None)
+    if callable(ask):
+        return sorted((_Topic(*topic) for topic in ask()), key=lambda topic: topic.rank)
+    ask = getattr(file, "topics_of_movement", None)
+    return [_Topic(name) for name in ask()] if callable(ask) else []
+
+
+def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic]) -> Inspection:
+    """Look into each table of a file, and take the first that holds a movement."""
+    listed = [f"topic {topic}" for topic in topics]
+    best: Inspection | None = None
+    for topic in topics[:MOST_TOPICS]:
+        if topic.count == 0:
+            continue
+        name = topic.name
+        try:
+            one = _inspect(paths, [(shown, [file.for_topics((name,))], None)], None, name)
+        except UnconstrainError as error:
+            listed.append(f"topic {name} was not looked into: {error}")
+            continue
+        one = replace(one, source=f"{one.source} {name}")
+        if best is None or one.next is not None:
+            best = one
+        if one.next is not None:
+            break
+    if best is None:
+        return Inspection(shown, 0, 0, None, None, (), (*listed, "no topic holds a movement"), None)
+    return replace(best, notes=(*listed, *best.notes))
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """A column taken for the time: where it is, its unit if that is known, and whether only its steps say so."""
+
+    place: int
+    unit: str
+    is_typed: bool
+    seconds: Array
+
+
+def _inspect(
+    paths: list[Any],
+    found: list[tuple[str, list[Format], LeRobot | None]],
+    robot: LeRobot | None,
+    topic: str | None,
+) -> Inspection:
+    shown, first, _ = found[0]
+    header = first[0].columns()
+    names = [column.name for column in header.columns]
+    alike = [f for f in found if [column.name for column in f[1][0].columns().columns] == names]
+    files = [file for _, formats, _ in alike for file in formats if file.at_once or any(file.row_groups)]
+    if not files:
+        raise DataError(f"{shown} has no samples")
+    looked = look_at(files)
+    notes = list(looked.notes)
+    if len(alike) < len(found):
+        others = next(f[0] for f in found if f not in alike)
+        notes.append(f"{others} has other columns than {shown}, so that one `fit` cannot read both")
+    called = [_called(column.name, column.part_of, column.component, robot) for column in looked.columns]
+    reports = judge(called, looked.values, looked.units)
+    reports = [
+        replace(report, kind="episode")
+        if i in looked.texts and tells_episodes(report.name, looked.texts[i])
+        else report
+        for i, report in enumerate(reports)
+    ]
+    declared = first[0].declared()
+    knows = declared is not None and declared.columns.state is not None
+    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values)]
+    clock = clocks[0] if clocks else None
+    rising = None if clock is None or len(alike) > 1 else clock.seconds
+    episodes, is_guess = choose_episodes(reports, looked.values, rising)
+    codes = _codes(episodes[0] if episodes else None, looked)
+    timing = None if clock is None else judge_stamps(clock.seconds, codes)
+    if clock is not None and timing is not None:
+        reports[clock.place] = replace(reports[clock.place], unit=clock.unit, kind="time")
+        notes += _time_notes(looked.names[clock.place] or f"column {clock.place}", clock, timing, reports)
+    if is_guess:
+        name = looked.names[episodes[0]]
+        notes.append(
+            f"episodes are told apart by {name}, which changes where the time starts anew; else give --episode"
+        )
+    notes += _oddities(reports, looked, codes)
+    judged = _Judged(looked, reports, clocks, episodes, codes, topic)
+    tried = _try(paths, judged, robot, knows, len(alike) == len(found))
+    notes += tried.notes
+    reports = [replace(report, name=name) for report, name in zip(tried.reports, looked.names, strict=True)]
+    rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
+    rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
+    return Inspection(
+        ", ".join(name for name, _, _ in alike),
+        rows,
+        n_episodes,
+        rate,
+        None if timing is None else timing.duration_s,
+        tuple(reports),
+        tuple(dict.fromkeys(notes)),
+        tried.next,
+    )
+
+
+@dataclass(frozen=True)
+class _Judged:
+    looked: Looked
+    reports: list[ColumnReport]
+    clocks: list[_Clock]
+    episodes: list[int]
+    codes: Codes
+    topic: str | None
+
+
+@dataclass(frozen=True)
+class _Tried:
+    next: str | None
+    notes: list[str]
+    reports: list[ColumnReport]
+
+
+@dataclass(frozen=True)
+class _Proposal:
+    columns: Columns
+    preparation: Preparation
+    notes: tuple[str, ...] = ()
+    velocities: tuple[int, ...] = ()
+    positions: tuple[int, ...] = ()
+
+
+def _kind_in(proposal: _Proposal, place: int, kind: str) -> str:
+    """Return the kind of a column now that it is known which role it can play."""
+    if place in proposal.velocities:
+        return "velocity"
+    return "position" if place in proposal.positions and kind == "number" else kind
+
+
+def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, alike: bool) -> _Tried:
+    """Try proposals one after the other until one can be read."""
+    if not alike:
+        return _Tried(None, [], judged.reports)
+    if robot is not None:
+        proposals = _for_robot(judged)
+    elif knows:
+        proposals = iter([_Proposal(Columns(), Preparation())])
+    else:
+        proposals = _proposals(judged)
+    problem = ""
+    for number, proposal in enumerate(proposals):
+        if number >= MOST_TRIED:
+            break
+        notes = list(proposal.notes)
+        if judged.looked.n_rows <= TRIED_ROWS:
+            try:
+                demos = open_recordings(
+                    paths, columns=proposal.columns, preparation=proposal.preparation
+                ).load()
+            except UnconstrainError as error:
+                problem = problem or str(error)
+                continue
+            notes += demos.notes
+        else:
+            notes.append("the command was not tried, as there is much to read")
+        reports = [
+            replace(report, kind=_kind_in(proposal, i, report.kind))
+            for i, report in enumerate(judged.reports)
+        ]
+        return _Tried(fit_command(paths, proposal.columns, proposal.preparation), notes, reports)
+    return _Tried(None, [*judged.looked.guesses, _why_none(judged, problem)], judged.reports)
+
+
+def _why_none(judged: _Judged, problem: str) -> str:
+    if problem:
+        return f"no movement can be read as it is: {problem}"
+    if not judged.looked.columns:
+        return "no movement was found: there are no columns of numbers"
+    groups = choose_states(judged.reports, judged.looked.columns, judged.looked.values, set())
+    if not groups:
+        return "no movement was found: no column looks like a position or an angle that changes"
+    return (
+        "there is no column of time, and none that is the velocity of another: name them with --state and --time, or "
+        "--action"
+    )
+
+
+def _for_robot(judged: _Judged) -> Iterator[_Proposal]:
+    columns, values = judged.looked.columns, judged.looked.values
+    states = tuple(i for i, column in enumerate(columns) if (column.part_of or column.name) == STATE)
+    actions = tuple(i for i, column in enumerate(columns) if (column.part_of or column.name) == ACTION)
+    times = [i for i, column in enumerate(columns) if column.name == TIME]
+    episode = next((i for i, column in enumerate(columns) if column.name == EPISODE), None)
+    differentiated = Columns(action=DIFFERENTIATE)
+    seconds = values[times[0]] if times else None
+    if states and len(states) == len(actions) and seconds is not None:
+        share = explained_by(
+            _matrix(values, states), _matrix(values, actions), seconds, _codes(episode, judged.looked)
+        )
+        if share > AGREES:
+            yield _Proposal(Columns(), Preparation(), velocities=actions, positions=states)
+            return
+        text = (
+            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion): it may be the "
+            "commanded state, so the states are differentiated; --action overrules this"
+        )
+        yield _Proposal(differentiated, Preparation(), (text,), positions=states)
+        return
+    yield _Proposal(differentiated, Preparation(), positions=states)
+
+
+def _proposals(judged: _Judged) -> Iterator[_Proposal]:
+    """Propose roles of columns, best first."""
+    looked, reports = judged.looked, judged.reports
+    clocks: list[_Clock | None] = [*judged.clocks[:2], None]
+    episode = judged.episodes[0] if judged.episodes else None
+    for clock in clocks:
+        taken = {i for i in (clock.place if clock else None, episode) if i is not None}
+        groups = choose_states(reports, looked.columns, looked.values, taken)
+        for group in groups:
+            notes = _group_notes(group, groups, looked)
+            refused: list[str] = []
+            for actions in choose_actions(group, reports, looked.columns):
+                share, guessed = _agreement(group, actions, clock, judged)
+                if share > AGREES:
+                    note = (f"the velocities agree with the positions' derivative to {share:.1%}{guessed}",)
+                    yield from _roles(judged, group, actions, clock, (*notes, *note))
+                elif clock is not None:
+                    listed = _several([_name(looked.names[i], i) for i in actions.places])
+                    refused.append(
+                        f"{listed}: no derivative of the positions (of whose motion they explain "
+                        f"{max(share, 0.0):.0%}), so the states are differentiated; --action overrules this"
+                    )
+            if clock is not None:
+                yield from _roles(judged, group, None, clock, (*notes, *refused))
+
+
+def _roles(
+    judged: _Judged, group: Group, actions: Group | None, clock: _Clock | None, notes: tuple[str, ...]
+) -> Iterator[_Proposal]:
+    looked = judged.looked
+    at = looked.positions
+    columns = Columns(
+        state=keys_of(group.places, looked.columns, at),
+        action=None if actions is None else keys_of(actions.places, looked.columns, at),
+        time=None if clock is None else key_of(clock.place, looked.columns, at),
+        episode=key_of(judged.episodes[0], looked.columns, at) if judged.episodes else None,
+    )
+    if judged.topic is not None:
+        topical = _with(columns, topic=judged.topic)
+        if topical is None:
+            return
+        columns = topical
+    unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
+    plain = Preparation(time_unit=unit)
+    velocities = () if actions is None else actions.places
+    yield _Proposal(columns, plain, notes, velocities, group.places)
+    if actions is None and clock is not None:
+        window = _shortest_window(clock, judged.codes)
+        if window is not None:
+            text = (
+                f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
+            )
+            yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
+    # Samples are left out only if the recording cannot be used with them.
+    dropping = _with(plain, drop="missing,duplicates,short")
+    if dropping is not None:
+        yield _Proposal(columns, dropping, notes, velocities, group.places)
+
+
+def _with(carrier: Any, **options: Any) -> Any:
+    """Return options with others set; None where there are no such options."""
+    known = {field.name for field in fields(carrier)}
+    return replace(carrier, **options) if known.issuperset(options) else None
+
+
+def _shortest_window(clock: _Clock, codes: Codes) -> float | None:
+    """Return the window (s) that fits the shortest episode, where that is shorter than usual and has three samples."""
+    order = np.argsort(codes, kind="stable")
+    parts = np.split(clock.seconds[order], np.cumsum(np.bincount(codes))[:-1])
+    if not parts or min(map(len, parts)) < 3:
+        return None
+    duration, steps = min((float(part[-1] - part[0]), len(part) - 1) for part in parts)
+    if duration >= Preparation.window or duration <= 0:
+        return None
+    return float(f"{max(2.0 * duration / steps, 0.5 * duration):.3g}")
+
+
+def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judged) -> tuple[float, str]:
+    """Return the share of the motion that actions explain; without a time, in units of an unknown step."""
+    values = judged.looked.values
+    X, V = _matrix(values, group.places), _matrix(values, actions.places)
+    if clock is not None:
+        return explained_by(X, V, clock.seconds, judged.codes), ""
+    rows = np.arange(len(X), dtype=np.float64)
+    order = np.argsort(judged.codes, kind="stable")
+    within = np.diff(judged.codes[order]) == 0
+    moved, told = np.diff(X[order], axis=0)[within], V[order][:-1][within]
+    whole = np.isfinite(moved).all(axis=1) & np.isfinite(told).all(axis=1)
+    total = float(np.sum(told[whole] ** 2))
+    step = float(np.sum(moved[whole] * told[whole])) / total if total > 0 else 0.0
+    if step <= 0:
+        return 0.0, ""
+    return explained_by(X, V * step, rows, judged.codes), f", if samples are {step:.3g} s apart"
+
+
+def _clock(place: int, report: ColumnReport, looked: Looked) -> _Clock:
+    values = looked.values[place]
+    assert values is not None
+    typed = looked.units[place]
+    steps = np.diff(values)
+    forward = steps[steps > 0]
+    typical = float(np.median(forward)) if len(forward) else 0.0
+    unit = typed or report.unit or epoch_unit(values) or _guess_unit(typical, forward)
+    start = values[np.isfinite(values)][0] if np.isfinite(values).any() else 0.0
+    return _Clock(place, unit, typed is not None, (values - start) / TIME_UNITS[unit])
+
+
+def _guess_unit(typical: float, forward: Array) -> str:
+    """Guess the unit of stamps by their typical step; a step of exactly one tells nothing."""
+    if typical >= NANOSECOND_STEP:
+        return "ns"
+    if typical >= 1000:
+        return "us"
+    whole = bool(np.all(forward == np.round(forward)))
+    return "ms" if whole and typical > 1 else "s"
+
+
+def _time_notes(name: str, clock: _Clock, timing: Timing, reports: Sequence[ColumnReport]) -> list[str]:
+    notes = []
+    called = repr(name)
+    if math.isclose(timing.step, 1.0, rel_tol=1e-12) and clock.unit == "s" and timing.even:
+        notes.append(
+            f"time {called} goes on in steps of exactly 1, read as seconds: if these are milliseconds or frames, "
+            "give --time-unit or another --time"
+        )
+    elif clock.unit != "s" and not clock.is_typed:
+        notes.append(f"time {called} is read in {clock.unit}; if that is wrong, give --time-unit")
+    if timing.gaps:
+        notes.append(
+            f"{timing.gaps} gap{'s' if timing.gaps != 1 else ''} of more than five typical steps, the longest of "
+            f"{timing.longest_gap:.3g} s"
+        )
+    if timing.repeated:
+        notes.append(
+            f"time {called} repeats a stamp at {timing.repeated} step{'s' if timing.repeated != 1 else ''}"
+        )
+    if timing.backwards:
+        notes.append(
+            f"time {called} goes back at {timing.backwards} step{'s' if timing.backwards != 1 else ''}: more than one "
+            "episode, or samples out of order"
+        )
+    if timing.bursts:
+        notes.append(
+            f"stamps in {called} come in bursts, as when messages are stamped on arrival: use the stamps of the sender "
+            "if there are any"
+        )
+    others = [r.name for r in reports if r.kind == "time" and r is not reports[clock.place]]
+    if others:
+        notes.append(f"{', '.join(map(repr, others))} may be the time as well; --time overrules the choice")
+    return notes
+
+
+def _oddities(reports: Sequence[ColumnReport], looked: Looked, codes: Codes) -> list[str]:
+    """Say what is odd about the columns."""
+    notes = []
+    for kind, what in (("constant", "do not change"), ("empty", "hold no value")):
+        which = [_name(report.name, i) for i, report in enumerate(reports) if report.kind == kind]
+        if which:
+            notes.append(f"{_several(which)}: columns that {what}")
+    lacking = [
+        (_name(r.name, i), r.missing) for i, r in enumerate(reports) if r.missing and r.kind != "empty"
+    ]
+    if lacking:
+        total = sum(count for _, count in lacking)
+        notes.append(
+            f"{total} missing value{'s' if total != 1 else ''}, in {_several([n for n, _ in lacking])}"
+        )
+    for i, (report, values) in enumerate(zip(reports, looked.values, strict=True)):
+        if report.kind == "angle" and values is not None:
+            count, turn = wraps(values)
+            if count:
+                notes.append(
+                    f"{_name(report.name, i)} is an angle that wraps by {'360' if turn == 360 else '2π'} {count} "
+                    f"time{'s' if count != 1 else ''}: its derivative is wrong there"
+                )
+    for start in _quaternion_starts(reports):
+        four = _matrix(looked.values, tuple(range(start, start + 4)))
+        flips = sign_flips(four, codes)
+        if flips:
+            notes.append(
+                f"the quaternion at column {start} changes its sign {flips} time{'s' if flips != 1 else ''} without "
+                "turning"
+            )
+    return notes
+
+
+def _quaternion_starts(reports: Sequence[ColumnReport]) -> list[int]:
+    starts, i = [], 0
+    while i < len(reports):
+        if reports[i].kind == "quaternion":
+            starts.append(i)
+            i += 4
+        else:
+            i += 1
+    return starts
+
+
+def _group_notes(group: Group, groups: Sequence[Group], looked: Looked) -> tuple[str, ...]:
+    notes = []
+    if group.kind == "number":
+        listed = _several([_name(looked.names[i], i) for i in group.places])
+        notes.append(f"{listed}: taken for the state because they change smoothly; --state overrules this")
+    named = [other.places for other in groups if other.kind in ("position", "state", "angle")]
+    others = sorted({i for places in named for i in places} - set(group.places))
+    if others:
+        listed = _several([_name(looked.names[i], i) for i in others])
+        notes.append(f"{listed}: left out of the state; --state overrules the choice")
+    return tuple(notes)
+
+
+def _codes(place: int | None, looked: Looked) -> Codes:
+    """Return the episode of each row, as a number: by file and, if there is one, by a column."""
+    if place is None:
+        return np.unique(looked.files, return_inverse=True)[1].astype(np.int64)
+    own: Any = looked.values[place]
+    if own is None:
+        own = looked.texts[place]
+    inner = np.unique(own, return_inverse=True)[1]
+    codes = looked.files * (int(inner.max()) + 1) + inner if len(inner) else inner
+    return np.unique(codes, return_inverse=True)[1].astype(np.int64)
+
+
+def _matrix(values: Sequence[Array | None], places: Sequence[int]) -> Array:
+    """Return columns of numbers as an array (N, k)."""
+    chosen = [own for i in places if (own := values[i]) is not None]
+    return np.stack(chosen, axis=1)
+
+
+def _called(name: str, part_of: str, component: int | None, robot: LeRobot | None) -> str:
+    """Name a component as the dataset does, to be judged by that."""
+    if robot is None or component is None:
+        return name
+    own = robot.component_names(part_of)
+    return f"{part_of} {own[component]}" if own else name
+
+
+def _name(name: str, place: int) -> str:
+    return name or f"column {place}"
+
+
+def _several(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:6])
+    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"

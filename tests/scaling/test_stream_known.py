@@ -175,8 +175,8 @@ def test_columns_not_needed_are_not_read(tmp_path, columns_read):
         uc.LocallyLinearPolicy(n_centers=2, risk="inconsistency", alpha=1e-6),
         uc.open(folder, **one, force="f1", force_threshold=1.0, free="free"),
     )
-    # A first row to see what there is, a sample to place centres on, and then all.
-    assert columns_read[1:] == [["x0", "u1"], ["x0", "u1", "f1", "free", "episode_index"]]
+    # First rows to see what there is and what the actions are, a sample to place centres on, and then all.
+    assert columns_read[2:] == [["x0", "u1"], ["x0", "u1", "f1", "free", "episode_index"]]
 
 
 # Checkpoints

@@ -10,7 +10,7 @@ from unconstrain.cli.command import command
 from unconstrain.cli.declared import option
 from unconstrain.errors import PolicyError
 from unconstrain.progress import working
-from unconstrain.recordings.relative import START
+from unconstrain.recordings.columns import START
 
 if TYPE_CHECKING:
     from unconstrain.comparison import Comparison

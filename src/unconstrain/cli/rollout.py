@@ -11,7 +11,7 @@ from unconstrain.cli.command import command
 from unconstrain.cli.declared import Number, Numbers
 from unconstrain.errors import DataError
 from unconstrain.progress import working
-from unconstrain.recordings.relative import START
+from unconstrain.recordings.columns import START
 
 if TYPE_CHECKING:
     import numpy as np

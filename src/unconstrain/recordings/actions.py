@@ -74,6 +74,11 @@ def find_kind(X: Array, U: Array, episodes: NDArray[np.int64], time: Array | Non
     """
     if X.shape != U.shape or len(X) < LEAST:
         return "velocity"
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # any numbers may be in a file
+        return _find_kind(X, U, episodes, time)
+
+
+def _find_kind(X: Array, U: Array, episodes: NDArray[np.int64], time: Array | None) -> str:
     within = np.diff(episodes) == 0
     steps = np.diff(X, axis=0)[within]
     given = U[:-1][within]

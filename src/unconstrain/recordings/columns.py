@@ -18,6 +18,10 @@ NO_ANGLE = "none"
 """What `angle` is where no column is to be taken for an angle."""
 
 
+START, GOAL = "start", "goal"
+"""What `relative_to` may be besides columns: the first and the last sample of each episode."""
+
+
 @dataclass(frozen=True)
 class Columns:
     """The roles that columns of a recording play, by name or by position.
@@ -43,17 +47,16 @@ class Columns:
     projections : column, or list of columns
         The nullspace projection of each sample: one column of lists of d² numbers, row by row, or d² columns. Empty or
         NaN where it is not known.
-    angle : column, or list of columns
-        The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default
-        angles, and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
     relative_to : "start", "goal", or list of columns
         What states are relative to: where each episode starts, or ends; or as many columns as there are states, such as
         an object's position. Given actions are made relative to columns that move as well, which needs `time`.
+    angle : column, or list of columns
+        The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default
+        angles, and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
     topic : str, or list of str
         For ROS bags: the topic whose messages are the samples, and whose fields are the columns. With several, columns
         are called `/topic/field`, and the others are aligned to the stamps of the first. By default the only topic with
         numbers.
-
 
     Raises
     ------
@@ -86,7 +89,7 @@ class Columns:
                     f"{name} takes column names or positions counted from 0, got {shown:.60}"
                 ) from None
             object.__setattr__(self, name, plain)
-        if self.relative_to in (["start"], ["goal"]):  # as the command line gives them
+        if self.relative_to in ([START], [GOAL]):  # as the command line gives them
             object.__setattr__(self, "relative_to", self.relative_to[0])
         for name in ("time", "episode", "free"):
             key = getattr(self, name)

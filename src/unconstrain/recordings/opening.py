@@ -12,7 +12,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.recordings.actions import ActionKind
 from unconstrain.recordings.batches import FORMS
-from unconstrain.recordings.columns import DIFFERENTIATE, Columns
+from unconstrain.recordings.columns import DIFFERENTIATE, GOAL, START, Columns
 from unconstrain.recordings.files import File, Folder, label, locate, short_names
 from unconstrain.recordings.formats import lerobot, recognize, rosbag_reading
 from unconstrain.recordings.formats.base import Declared, Format, narrow
@@ -24,7 +24,6 @@ from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
 from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.recording import Recording
-from unconstrain.recordings.relative import GOAL, START
 from unconstrain.recordings.roles import assign_roles
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.tables import Tables

@@ -8,10 +8,9 @@ its goal, wherever that is; a wiping circle is drawn about a centre that wanders
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from unconstrain.recordings.columns import GOAL, START
 
-START, GOAL = "start", "goal"
-"""What states may be relative to besides columns: the first and the last sample of each episode."""
+Array = NDArray[np.float64]
 
 
 def moving_centre(values: Array, time: Array, seconds: float) -> Array:

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.columns import NO_ANGLE, Columns, Keys
+from unconstrain.recordings.columns import GOAL, NO_ANGLE, START, Columns, Keys
 from unconstrain.recordings.formats.base import ColumnKey, Declared
 from unconstrain.recordings.preparation import Preparation
-from unconstrain.recordings.relative import GOAL, START
 from unconstrain.recordings.table import Field, Header
 
 UNNAMED = re.compile(r"[xu]\d+(_dot)?")

@@ -83,7 +83,7 @@ def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -
     >>> import unconstrain as uc
     >>> print(uc.inspect("wipe.csv"))  # doctest: +SKIP
     """
-    paths = [source] if isinstance(source, str | os.PathLike) else list(source)
+    paths = _paths(source)
     found = open_formats(paths, Columns())
     shown, files, robot = found[0]
     topics = _topics(files[0])
@@ -110,7 +110,7 @@ def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
     DataError
         There is no such file, or it cannot be read.
     """
-    paths = [source] if isinstance(source, str | os.PathLike) else list(source)
+    paths = _paths(source)
     file = open_formats(paths, Columns())[0][1][0]
     topics = _topics(file)
     if topics:
@@ -596,3 +596,11 @@ def _name(name: str, place: int) -> str:
 def _several(names: Sequence[str]) -> str:
     shown = ", ".join(names[:6])
     return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"
+
+
+def _paths(source: Any) -> list[str | os.PathLike[str]]:
+    if isinstance(source, str | os.PathLike):
+        return [source]
+    if not isinstance(source, Iterable):
+        raise DataError(f"inspect takes a path or several of them, got {source!r:.60}")
+    return list(source)

@@ -244,7 +244,11 @@ def open_formats(
         There are no such files, or they are of no known format.
     """
     return [
-        (shown, [_open_file((file, robot is not None or len(files) > 1)) for file in files], robot)
+        (
+            shown,
+            _joined(shown, [_open_file((file, robot is not None or len(files) > 1)) for file in files], None),
+            robot,
+        )
         for place in locate(paths)
         for shown, files, robot in _recordings_of(place, columns)
     ]

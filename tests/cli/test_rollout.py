@@ -57,7 +57,7 @@ def test_a_policy_that_is_relative_to_its_goal_is_told_where_that_is(run, tmp_pa
     np.savetxt("reach.csv", np.concatenate(rows), delimiter=",", header="run,t,x,y", comments="")
     code, out, err = run(
         *("fit", "reach.csv", "--state", "x,y", "--time", "t", "--episode", "run", "--relative-to", "goal"),
-        *("--model", "linear", "--out", "reach.skops"),
+        *("--model", "linear", "--out", "reach.skops", "--resumable"),
     )
     assert code == 0, err
     assert "states are relative to where each episode ends" in out
@@ -70,3 +70,11 @@ def test_a_policy_that_is_relative_to_its_goal_is_told_where_that_is(run, tmp_pa
     path = np.genfromtxt("rollout.csv", delimiter=",", names=True)
     assert path["x"][0] == 6.0
     assert abs(path["x"][-1] - 5.0) < 0.1
+    # Where the policy is unsure does not hang on where in the room the goal is.
+    stops = []
+    for far in (0, 1000):
+        place = (f"--start={6 + far},5", f"--goal={5 + far},5")
+        _, out, _ = run("rollout", "reach.skops", *place, "--stop-when-unsure", 1, "--overwrite")
+        stops += [line for line in out.splitlines() if line.startswith("stopped after")]
+    assert len(stops) == 2
+    assert stops[0] == stops[1]

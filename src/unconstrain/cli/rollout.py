@@ -95,6 +95,7 @@ def rollout(
             f"at the start already {_unsure_at(unsure, movement.states[0])}: start nearer to the recordings, or give a "
             "larger share to stop_when_unsure="
         )
+    last = movement.states[-1]  # as the policy has it
     movement = replace(movement, states=movement.states + origin)
     write_csv(movement, out)
     plot.save(plot.rollout_figure(movement), figure)
@@ -102,7 +103,7 @@ def rollout(
     reached = ", ".join(f"{name} {reporting.shown_number(value, scale)}" for name, value, scale in end)
     reporting.say(f"after {taken * dt:g} s: {reached}")
     if unsure is not None and taken < steps:
-        reporting.say(f"stopped after {taken} of {steps} steps: {_unsure_at(unsure, movement.states[-1])}")
+        reporting.say(f"stopped after {taken} of {steps} steps: {_unsure_at(unsure, last)}")
     reporting.say(f"movement: {out}\nfigure: {figure}")
 
 

@@ -97,6 +97,19 @@ def test_without_time_velocities_that_agree_are_enough(tmp_path):
     assert run_next(found, tmp_path)[0] == 0
 
 
+@pytest.mark.parametrize("counted", [False, True])
+def test_without_any_time_samples_are_counted_and_that_is_said(tmp_path, counted):
+    _, phase = circles()
+    frames = {"frame": np.arange(len(phase))} if counted else {}
+    path = write(tmp_path / "circle.csv", **frames, x=np.cos(phase), y=np.sin(phase))
+    found = uc.inspect(path)
+    assert "--state x,y --rate 1.0" in found.next
+    assert any("no column tells the time" in note and "--rate overrules" in note for note in found.notes)
+    code, said = run_next(found, tmp_path, "--model", "linear")
+    assert code == 0
+    assert "time by row / rate" in said
+
+
 def test_episodes_come_from_their_column(tmp_path):
     t, phase = circles(100)
     t, phase, run_ = np.tile(t, 4), np.tile(phase, 4), np.repeat(np.arange(4), 100)

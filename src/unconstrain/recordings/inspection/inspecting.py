@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -320,13 +320,7 @@ def _why_none(judged: _Judged, problem: str) -> str:
         return f"no movement can be read as it is: {problem}"
     if not judged.looked.columns:
         return "no movement was found: there are no columns of numbers"
-    groups = choose_states(judged.reports, judged.looked.columns, judged.looked.values, set())
-    if not groups:
-        return "no movement was found: no column looks like a position or an angle that changes"
-    return (
-        "there is no column of time, and none that is the velocity of another: name them with --state and --time, or "
-        "--action"
-    )
+    return "no movement was found: no column looks like a position or an angle that changes"
 
 
 def _for_robot(judged: _Judged) -> Iterator[_Proposal]:
@@ -377,6 +371,9 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
                     )
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
+            elif not any(clocks):
+                text = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
+                yield from _roles(judged, group, None, None, (*notes, text))
 
 
 def _roles(
@@ -391,12 +388,9 @@ def _roles(
         episode=key_of(judged.episodes[0], looked.columns, at) if judged.episodes else None,
     )
     if judged.topic is not None:
-        topical = _with(columns, topic=judged.topic)
-        if topical is None:
-            return
-        columns = topical
+        columns = replace(columns, topic=judged.topic)
     unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
-    plain = Preparation(time_unit=unit)
+    plain = Preparation(time_unit=unit, rate=1.0 if clock is None and actions is None else None)
     velocities = () if actions is None else actions.places
     yield _Proposal(columns, plain, notes, velocities, group.places)
     if actions is None and clock is not None:
@@ -407,15 +401,8 @@ def _roles(
             )
             yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
     # Samples are left out only if the recording cannot be used with them.
-    dropping = _with(plain, drop="missing,duplicates,short")
-    if dropping is not None:
-        yield _Proposal(columns, dropping, notes, velocities, group.places)
-
-
-def _with(carrier: Any, **options: Any) -> Any:
-    """Return options with others set; None where there are no such options."""
-    known = {field.name for field in fields(carrier)}
-    return replace(carrier, **options) if known.issuperset(options) else None
+    dropping = replace(plain, drop="missing,duplicates,short")
+    yield _Proposal(columns, dropping, notes, velocities, group.places)
 
 
 def _shortest_window(clock: _Clock, codes: Codes) -> float | None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain import demonstrations_file
 from unconstrain.arrays import check_number, check_numbers, check_whole, quote
 from unconstrain.errors import DataError, UnconstrainError, printable
+from unconstrain.spaces import Numbers, Space
 
 MOST_BLOCKS = 2**31
 """In an episode: labels of blocks are whole numbers of 64 bits."""
@@ -52,6 +53,8 @@ class Demonstrations:
         Measured contact forces; see `constraints.from_recording`.
     free : array_like of shape (N,), optional
         1 where the demonstrator says that nothing constrained the motion, else 0.
+    space : Space, optional
+        What states are: see `unconstrain.spaces`. By default numbers.
 
     Attributes
     ----------
@@ -77,6 +80,7 @@ class Demonstrations:
     projections: Array | None
     forces: Array | None
     free: Array | None
+    space: Space
     state_names: tuple[str, ...]
     action_names: tuple[str, ...]
     episode_labels: tuple[str, ...]
@@ -96,6 +100,7 @@ class Demonstrations:
         notes: Sequence[str] = (),
         forces: ArrayLike | None = None,
         free: ArrayLike | None = None,
+        space: Space | None = None,
     ) -> None:
         X = _samples("states", states)
         U = _samples("actions", actions)
@@ -110,6 +115,7 @@ class Demonstrations:
             "projections": None if projections is None else _projections(projections, N, d),
             "forces": None if forces is None else _forces(forces, N),
             "free": None if free is None else _flags(free, N),
+            "space": _space(space, X),
             "state_names": _names("state_names", state_names, "x", n),
             "action_names": _names("action_names", action_names, "u", d),
             "episode_labels": labels,
@@ -501,6 +507,18 @@ def _listed(what: str, texts: Sequence[str]) -> Sequence[str]:
         return [str(text) for text in texts]
     except TypeError:  # an array without dimensions
         raise DataError(f"{what} must be a list of texts, got {quote(texts)}") from None
+
+
+def _space(space: Space | None, X: Array) -> Space:
+    if space is None:
+        return Numbers(X.shape[1])
+    if not isinstance(space, Space) or space.n_states != X.shape[1]:
+        words = space.words if isinstance(space, Space) else repr(space)
+        raise DataError(f"states have {X.shape[1]} numbers, which do not stand for {words:.80}")
+    faults = space.faults(X)
+    if faults.any():
+        raise DataError(f"the states of sample {int(np.argmax(faults))} are none of these: {space.words}")
+    return space
 
 
 def _episodes(

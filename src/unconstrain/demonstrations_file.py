@@ -51,7 +51,8 @@ def arrays_of(demos: "Demonstrations") -> dict[str, NDArray[Any]]:
 def describe(demos: "Demonstrations", roles: dict[str, Any]) -> dict[str, Any]:
     """Return what a file says of its columns: their roles, and the names that demonstrations have."""
     names = {name: list(getattr(demos, name)) for name in NAMES}
-    return {"format": FORMAT, **names, "roles": roles}
+    space = {} if demos.space.is_flat else {"space": demos.space.describe()}
+    return {"format": FORMAT, **names, **space, "roles": roles}
 
 
 def columns_of(demos: "Demonstrations") -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:

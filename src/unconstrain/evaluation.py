@@ -23,7 +23,7 @@ class Line:
     free : float
         Share of them that were free, as the policy infers, or as its risk assumes.
     rmse : float
-        Root mean square error of the whole action, in its unit.
+        Root mean square error of the whole action, in units of the policy's scale.
     angle : float
         Mean angle between recorded and predicted action, in radians; NaN where nothing moves.
     explained : float
@@ -92,6 +92,7 @@ def evaluate(policy: Policy, demos: Demonstrations, most_episodes: int = 20) -> 
             f"{demos.states.shape[1]} and {U.shape[1]}: choose the columns it was learnt from"
         )
     P = policy.predict(demos.states).reshape(U.shape)
+    U, P = policy.scaled(U), policy.scaled(P)
     if policy.solution_.belief is not None:
         free = policy.free_probability(demos)
     else:
@@ -100,7 +101,8 @@ def evaluate(policy: Policy, demos: Demonstrations, most_episodes: int = 20) -> 
     labels = demos.episode_labels[:most_episodes] if several else []
     nupe = None
     if demos.policy is not None:
-        nupe = metrics.normalized(metrics.unconstrained_policy_error(demos.policy, P), demos.policy)
+        true = policy.scaled(demos.policy)
+        nupe = metrics.normalized(metrics.unconstrained_policy_error(true, P), true)
     return Evaluation(
         tuple(_line(label, demos.episodes == code, U, P, free) for code, label in enumerate(labels)),
         demos.n_episodes - len(labels) if several else 0,

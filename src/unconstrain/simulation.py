@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.arrays import check_numbers, quote
-from unconstrain.constraints.nullspace import projection
+from unconstrain.constraints.nullspace import in_metric, projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.memory import check_memory
+from unconstrain.spaces import Numbers, Space
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,9 @@ def rollout(
     stop_when: StopWhen | None = None,
 ) -> Demonstrations:
     """Integrate a policy whose actions are velocities of its state: ``x_{k+1} = x_k + dt N(x_k) π(x_k)``.
+
+    States of a space, such as rotations, are followed within it (`Space.step`); with accelerations for actions, so are
+    velocities.
 
     Parameters
     ----------
@@ -172,20 +176,22 @@ def simulate(
         raise UnconstrainError(f"a rollout needs a whole number of steps, not {steps}")
     _check_duration(dt)
     x = _checked_start(start, getattr(policy, "n_features_in_", None))
+    space = getattr(policy, "space_", None) or Numbers(x.shape[1])
+    scale = getattr(policy, "scale_", None)
     # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(samples):
             wanted = _actions(predict, x)
             N = None if project is None else project(k, x, wanted)
-            u = wanted if N is None else np.einsum("sij,sj->si", N, wanted)
+            u = wanted if N is None else _project(N, wanted, scale)
             if k == 0:
                 (S, n), d = x.shape, wanted.shape[1]
                 check_size(S, samples, n, d, constrained=N is not None)
                 states, policies, actions = (np.empty((S, samples, width)) for width in (n, d, d))
                 projections = None if N is None else np.empty((S, samples, d, d))
             if advance is None:
-                _check_velocities(x, u)
-                following = x + dt * u
+                _check_velocities(space, x, u)
+                following = space.step(x, u, dt)
             else:
                 following, u = advance(x, u)
             if not (np.isfinite(u).all() and (k + 1 == samples or np.isfinite(following).all())):
@@ -211,7 +217,8 @@ def simulate(
         policy=_flat(policies, taken),
         projections=None if projections is None else _flat(projections, taken),
         state_names=names,
-        action_names=_action_names(names, actions.shape[-1]) if action_names is None else action_names,
+        action_names=_action_names(space, names, actions.shape[-1]) if action_names is None else action_names,
+        space=space if advance is None else None,
     )
 
 
@@ -290,12 +297,20 @@ def _actions(predict: Callable[[Array], ArrayLike], x: Array) -> Array:
     return u
 
 
-def _check_velocities(x: Array, u: Array) -> None:
-    if u.shape[1] != x.shape[1]:
+def _check_velocities(space: Space, x: Array, u: Array) -> None:
+    if u.shape[1] != space.n_actions:
         raise PolicyError(
             f"the policy maps {_count(x.shape[1], 'state')} to {_count(u.shape[1], 'action')}, and only "
-            "velocities of the state, one each, can be rolled out: learn it from such actions"
+            f"velocities of the state, {'one each' if space.is_flat else _count(space.n_actions, 'number')}, can be "
+            "rolled out: learn it from such actions"
         )
+
+
+def _project(N: Array, wanted: Array, scale: Array | None) -> Array:
+    """Project the policy's actions (S, d) in the metric that it was learnt in."""
+    if scale is None or np.all(scale == scale[0]):
+        return np.einsum("sij,sj->si", N, wanted)
+    return scale * np.einsum("sij,sj->si", in_metric(N, scale), wanted / scale)
 
 
 def _one_per_start(N: Array, starts: int, d: int) -> Array:
@@ -322,7 +337,9 @@ def _names(policy: Policy, n: int) -> tuple[str, ...]:
     return tuple(f"x{i + 1}" for i in range(n))
 
 
-def _action_names(states: tuple[str, ...], d: int) -> tuple[str, ...] | None:
+def _action_names(space: Space, states: tuple[str, ...], d: int) -> tuple[str, ...] | None:
+    if not space.is_flat and d == space.n_actions:
+        return space.action_names(states)
     return tuple(f"{name}_velocity" for name in states) if len(states) == d else None
 
 

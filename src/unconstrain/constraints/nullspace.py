@@ -62,6 +62,28 @@ def projection(A: ArrayLike) -> NDArray[np.float64]:
     return N
 
 
+def in_metric(N: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Compute the projections that the constraints behind projections have in units of a scale.
+
+    With `A = I - N`, `A u = 0` is `A S u' = 0` for `u = S u'`.
+
+    Parameters
+    ----------
+    N : ndarray of shape (N, d, d)
+        All NaN where not known.
+    scale : ndarray of shape (d,)
+        The diagonal of S.
+
+    Returns
+    -------
+    ndarray of shape (N, d, d)
+        All NaN where not known.
+    """
+    result, known = N.copy(), ~np.isnan(N[:, 0, 0])
+    result[known] = projection((np.eye(len(scale)) - N[known]) * scale)
+    return result
+
+
 def combine(*A: ArrayLike) -> NDArray[np.float64]:
     """Combine constraint matrices into one that asks for all of them, by stacking their rows.
 

@@ -16,6 +16,7 @@ from unconstrain.errors import DataError
 from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
 from unconstrain.fitting.corrected import CorrectedMoments, Part, add_up
 from unconstrain.fitting.correction import Correction
+from unconstrain.fitting.in_space import in_units
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation, informative, observe, unknown
@@ -167,7 +168,7 @@ class Accumulator:
         Parameters
         ----------
         samples : Samples
-            Checked: finite, of the model's dimensions.
+            Checked: finite, of the model's dimensions, in their own units.
 
         Raises
         ------
@@ -214,6 +215,7 @@ class Accumulator:
             An action is so long that hardly any other is motion beside it, or a known projection does not let its
             sample's own action through.
         """
+        samples = in_units(self.model.scale, samples)
         U = samples.actions
         r = lengths(U)
         longest = max(float(r.max(initial=0.0)), self.longest)

@@ -64,6 +64,11 @@ class LocalModels:
         return len(self.centers)
 
     @property
+    def scale(self) -> None:
+        """None: actions are taken as they are."""
+        return
+
+    @property
     def shares_basis(self) -> bool:
         """Whether all actions share one basis, `Φ(x) = I ⊗ b(x)ᵀ`."""
         return isinstance(self.features, FullBasis)

@@ -41,6 +41,11 @@ class Model(Protocol):
         ...
 
     @property
+    def scale(self) -> np.ndarray | None:
+        """What a length of one is along each action, (d,); None for one. The model's actions are in this unit."""
+        ...
+
+    @property
     def shares_basis(self) -> bool:
         """Whether all actions share one basis, `Φ(x) = I ⊗ b(x)ᵀ`."""
         ...

@@ -26,6 +26,7 @@ from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
 from unconstrain.fitting.calibration import Calibration
 from unconstrain.fitting.contact import Belief, infer
+from unconstrain.fitting.in_space import InSpace, find_scale, in_units
 from unconstrain.fitting.inference import infer_contact
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
@@ -34,6 +35,7 @@ from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import moving
 from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
+from unconstrain.spaces import Numbers, Space
 
 if TYPE_CHECKING:
     from unconstrain.deploy.compiled import CompiledPolicy
@@ -57,6 +59,8 @@ class Policy(RegressorMixin, BaseEstimator):
 
     risk: str
     alpha: float | str
+    space: Space | None
+    scale: Any
     model_: Model
     solution_: Solution
     accumulator_: Accumulator
@@ -127,7 +131,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         fresh = copy(self)
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-        accumulator = fresh.start(samples)
+        accumulator = fresh.start(samples, X.space if isinstance(X, Demonstrations) else None)
         if self.risk == "adaptive":
             accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
         else:
@@ -189,13 +193,15 @@ class Policy(RegressorMixin, BaseEstimator):
             )
         return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
 
-    def start(self, samples: Samples) -> Accumulator:
+    def start(self, samples: Samples, space: Space | None = None) -> Accumulator:
         """Make an accumulator for this policy's options, its model placed by some samples.
 
         Parameters
         ----------
         samples : Samples
             Checked. Those without motion or a known projection do not count in placing.
+        space : Space, optional
+            That the samples' states belong to; numbers by default. The policy's own, if it has one, comes first.
 
         Returns
         -------
@@ -219,8 +225,15 @@ class Policy(RegressorMixin, BaseEstimator):
         if not shows.any():
             raise DataError(NO_DIRECTION)
         weights = np.ones(len(X)) if weights is None else weights
-        model = self.place(X[counted], U.shape[1], weights[counted])
-        return Accumulator(model, self.risk, self.alpha)
+        space = self.space or space or Numbers(X.shape[1])
+        _check_in_space(space, X)
+        scale = find_scale(self.scale, space, X, U.shape[1])
+        if space.is_flat and scale is None:
+            return Accumulator(self.place(X[counted], U.shape[1], weights[counted]), self.risk, self.alpha)
+        base = None if space.is_flat else space.find_base(X[counted])
+        Z = X[counted] if space.is_flat else space.embed(X[counted], base)
+        placed = self.place(Z, U.shape[1], weights[counted])
+        return Accumulator(InSpace(placed, space, base, scale), self.risk, self.alpha)
 
     def resume(self) -> Accumulator:
         """Copy the sums that this policy was solved from, to add to them.
@@ -303,10 +316,11 @@ class Policy(RegressorMixin, BaseEstimator):
                 "ask for return_std or return_cov, not both: the deviations are the roots of the covariance's diagonal"
             )
         X = check_states(self, X)
-        actions = self.model_.evaluate(X, self.solution_.w)
+        scaled = self.model_.evaluate(X, self.solution_.w)
+        actions = self._in_own_units(scaled)
         if not (return_std or return_cov):
             return actions[:, 0] if self.actions_are_scalars_ else actions
-        covariance = self.model_.covariance(X, actions, self.posterior())
+        covariance = self._in_own_units(self.model_.covariance(X, scaled, self.posterior()))
         spread = covariance if return_cov else np.sqrt(np.maximum(np.einsum("njj->nj", covariance), 0.0))
         if self.actions_are_scalars_:
             return actions[:, 0], spread.reshape(len(X))
@@ -374,8 +388,9 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         X = check_states(self, X)
-        actions = self.model_.evaluate(X, self.solution_.w)
-        return self.model_.covariance(X, actions, self.posterior() if posterior is None else posterior)
+        scaled = self.model_.evaluate(X, self.solution_.w)
+        posterior = self.posterior() if posterior is None else posterior
+        return self._in_own_units(self.model_.covariance(X, scaled, posterior))
 
     def free_probability(
         self,
@@ -413,7 +428,7 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         belief = self._belief("free_probability")
         samples, _ = check_input(copy(self), X, y, groups, None, projections, first=False)
-        return infer(self.model_, belief, samples).free
+        return infer(self.model_, belief, in_units(self.model_.scale, samples)).free
 
     def observe(self, samples: Samples) -> Observation:
         """Say what samples show of the policy: as inferred, or else along their motion.
@@ -428,7 +443,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Observation
             Of N samples.
         """
-        belief = self.solution_.belief
+        belief, samples = self.solution_.belief, in_units(self.model_.scale, samples)
         if belief is not None:
             return infer(self.model_, belief, samples).expand()
         return observe("inconsistency", samples.actions, samples.projections)
@@ -468,8 +483,8 @@ class Policy(RegressorMixin, BaseEstimator):
         DataError
             Nothing moves.
         """
-        U = check_actions(y)
-        P = check_actions(self.predict(X), "predictions")
+        U = self.scaled(check_actions(y))
+        P = self.scaled(check_actions(self.predict(X), "predictions"))
         if self.solution_.belief is not None:
             free = self.free_probability(X, y, groups=groups)
         else:
@@ -609,6 +624,22 @@ class Policy(RegressorMixin, BaseEstimator):
         left.solution_ = accumulator.solve(self.alpha, without)
         return left
 
+    def scaled(self, U: np.ndarray) -> np.ndarray:
+        """Divide actions by the scale, so that their lengths and angles are those that the policy was learnt by.
+
+        Parameters
+        ----------
+        U : ndarray of shape (N, d)
+            Actions.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            `U` itself where there is no scale.
+        """
+        scale = self.model_.scale
+        return U if scale is None else U / scale
+
     def check_options(self) -> None:
         """Raise `PolicyError` for a risk or a weight decay that is none."""
         check_choice(self.risk, "risk", RISKS)
@@ -621,6 +652,17 @@ class Policy(RegressorMixin, BaseEstimator):
     def n_actions_(self) -> int:
         """Dimension of the actions, d."""
         return self.model_.n_actions
+
+    @property
+    def space_(self) -> Space:
+        """What the states are that were learnt from."""
+        return self.model_.space if isinstance(self.model_, InSpace) else Numbers(self.model_.n_states)
+
+    @property
+    def scale_(self) -> np.ndarray:
+        """What a length of one is along each action, (d,): ones, unless `scale` or the states say otherwise."""
+        scale = self.model_.scale
+        return np.ones(self.n_actions_) if scale is None else scale
 
     @property
     def alpha_(self) -> float:
@@ -639,7 +681,7 @@ class Policy(RegressorMixin, BaseEstimator):
 
     @property
     def noise_(self) -> float:
-        """Standard deviation σ of the recorded actions about what policy and constraints say, in their unit."""
+        """Standard deviation σ of the recorded actions about what policy and constraints say, in units of `scale_`."""
         if np.isfinite(self.solution_.noise):
             return float(np.sqrt(self.solution_.noise))
         if self.solution_.belief is None:
@@ -703,6 +745,13 @@ class Policy(RegressorMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
 
+    def _in_own_units(self, scaled: np.ndarray) -> np.ndarray:
+        """Return actions (N, d), or covariances (N, d, d), in the unit of each action."""
+        scale = self.model_.scale
+        if scale is None:
+            return scaled
+        return scaled * (scale if scaled.ndim == 2 else np.outer(scale, scale))
+
     def _belief(self, name: str) -> Belief:
         belief = self.solution_.belief
         if belief is None:
@@ -721,6 +770,21 @@ class Policy(RegressorMixin, BaseEstimator):
         if not hasattr(fresh, "feature_names_in_") and hasattr(self, "feature_names_in_"):
             del self.feature_names_in_
         return self
+
+
+def _check_in_space(space: Any, X: np.ndarray) -> None:
+    """Raise an error where states (N, n) are not of the space."""
+    if not isinstance(space, Space):
+        raise PolicyError(f"space must be a kind of state of unconstrain.spaces, got {space!r:.60}")
+    if space.n_states != X.shape[1]:
+        raise PolicyError(
+            f"states have {X.shape[1]} numbers, and those of the space {space.n_states}: {space.words}"
+        )
+    faults = space.faults(X)
+    if faults.any():
+        raise DataError(
+            f"the states of sample {int(np.argmax(faults))} are no rotation; these are {space.words}, of norm 1"
+        )
 
 
 def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:

@@ -13,9 +13,11 @@ from unconstrain.arrays import check_choice
 from unconstrain.features.base import Features, fit_features
 from unconstrain.features.centers import place_centers
 from unconstrain.features.full import as_features
+from unconstrain.fitting.in_space import InSpace
 from unconstrain.fitting.local_models import PRIORS, LocalModels
 from unconstrain.fitting.model import Model
 from unconstrain.policies.base import Policy
+from unconstrain.spaces import Space
 
 
 class LocallyLinearPolicy(Policy):
@@ -46,11 +48,17 @@ class LocallyLinearPolicy(Policy):
         What each model decays to: the policy of the same features fitted to all data together, or zero, as published.
     random_state : int, optional
         For "kmeans".
+    space : Space, optional
+        What the states are; see `unconstrain.spaces`. By default what the demonstrations say, or numbers.
+    scale : "auto" or array_like of shape (d,), optional
+        What a length of one is along each action: lengths, angles and noise are those of `u_i / s_i`. "auto" takes how
+        far the states spread along each. By default actions count as they are, but where some are angles, and others
+        are not, the spread of all of a unit decides.
 
     Attributes
     ----------
     centers_ : ndarray of shape (M, n)
-        The centres of the receptive fields.
+        The centres of the receptive fields, as the space lays states out.
     width_ : ndarray of shape (n,)
         Their width σ along each state, in its unit.
     weights_ : ndarray of shape (M, P)
@@ -76,6 +84,8 @@ class LocallyLinearPolicy(Policy):
         alpha: float | str = "cv",
         prior: str = "global",
         random_state: int | None = 0,
+        space: Space | None = None,
+        scale: Any = None,
     ):
         self.features = features
         self.width = width
@@ -86,6 +96,8 @@ class LocallyLinearPolicy(Policy):
         self.alpha = alpha
         self.prior = prior
         self.random_state = random_state
+        self.space = space
+        self.scale = scale
 
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
         """Place the centres and fit the features.
@@ -139,7 +151,7 @@ class LocallyLinearPolicy(Policy):
     @property
     def width_(self) -> np.ndarray:
         """The width σ of the receptive fields along each state, in its unit, (n,)."""
-        return np.broadcast_to(self._places.width, self.n_features_in_)
+        return np.broadcast_to(self._places.width, self._places.n_states)
 
     @property
     def weights_(self) -> np.ndarray:
@@ -158,12 +170,14 @@ class LocallyLinearPolicy(Policy):
 
     @property
     def _places(self) -> LocalModels:
-        assert isinstance(self.model_, LocalModels)
-        return self.model_
+        model = self.model_.model if isinstance(self.model_, InSpace) else self.model_
+        assert isinstance(model, LocalModels)
+        return model
 
     @property
     def _linear(self) -> tuple[np.ndarray, np.ndarray]:
-        linear = self._places.linear_parameters(self.solution_.w)
+        own = self._places if self._places is self.model_ else None
+        linear = None if own is None else own.linear_parameters(self.solution_.w)
         if linear is None:
             raise AttributeError("coef_ and intercept_ are there only for linear local models, features=None")
         return linear

@@ -12,8 +12,10 @@ import numpy as np
 from unconstrain.features.base import Features, LinearInState, fit_features
 from unconstrain.features.full import as_features
 from unconstrain.fitting.global_model import GlobalModel
+from unconstrain.fitting.in_space import InSpace
 from unconstrain.fitting.model import Model
 from unconstrain.policies.base import Policy
+from unconstrain.spaces import Space
 
 
 class ParametricPolicy(Policy):
@@ -34,6 +36,12 @@ class ParametricPolicy(Policy):
         The weight decay λ, a pure number: relative to what the samples say on the mean of the parameters, whatever the
         units (`fitting.decay`). Intercepts hardly decay. "cv" chooses it by held-out risk among 25 values over five
         folds of episodes.
+    space : Space, optional
+        What the states are; see `unconstrain.spaces`. By default what the demonstrations say, or numbers.
+    scale : "auto" or array_like of shape (d,), optional
+        What a length of one is along each action: lengths, angles and noise are those of `u_i / s_i`. "auto" takes how
+        far the states spread along each. By default actions count as they are, but where some are angles, and others
+        are not, the spread of all of a unit decides.
 
     Attributes
     ----------
@@ -72,10 +80,20 @@ class ParametricPolicy(Policy):
     True
     """
 
-    def __init__(self, features: Any = None, *, risk: str = "adaptive", alpha: float | str = "cv"):
+    def __init__(
+        self,
+        features: Any = None,
+        *,
+        risk: str = "adaptive",
+        alpha: float | str = "cv",
+        space: Space | None = None,
+        scale: Any = None,
+    ):
         self.features = features
         self.risk = risk
         self.alpha = alpha
+        self.space = space
+        self.scale = scale
 
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
         """Fit the features.
@@ -124,7 +142,7 @@ class ParametricPolicy(Policy):
 
     @property
     def _linear(self) -> tuple[np.ndarray, np.ndarray]:
-        features = self.model_.features
+        features = None if isinstance(self.model_, InSpace) else self.model_.features
         linear = features.linear(self.solution_.w) if isinstance(features, LinearInState) else None
         if linear is None:
             raise AttributeError("coef_ and intercept_ are there only for the linear policy, features=None")

@@ -59,12 +59,12 @@ def load_policy(path: str | PathLike[str], *, trusted: Iterable[Any] = ()) -> Po
 
 
 def _check_usable(policy: Policy) -> None:
-    """Raise something where a policy is not fitted, or does not act at the origin."""
+    """Raise something where a policy is not fitted, or does not act at the origin of its states."""
     check_is_fitted(policy)
     n, d = policy.n_features_in_, policy.n_actions_
     if not all(isinstance(each, int) and 0 < each <= LARGEST_DIMENSION for each in (n, d)):
         raise TypeError("it has no dimensions")
-    actions = policy.predict(np.zeros((1, n)))
+    actions = policy.predict(policy.space_.origin[None])
     if actions.reshape(1, -1).shape != (1, d) or (actions.ndim == 1) != policy.actions_are_scalars_:
         raise TypeError(f"its actions have shape {actions.shape}")
     if not np.isfinite(actions).all():

@@ -44,10 +44,11 @@ class Unsure:
         Returns
         -------
         deviation : ndarray of shape (N,)
-            The root of the summed variances of all actions, in units of the action.
+            The root of the summed variances of all actions, in units of the policy's scale.
         speed : ndarray of shape (N,)
             Length of the predicted action.
         """
-        P = np.reshape(self.policy.predict(X), (len(X), -1))
-        variance = np.einsum("njj->n", self.policy.covariance(X, self.posterior))
+        P = self.policy.scaled(np.reshape(self.policy.predict(X), (len(X), -1)))
+        covariance = self.policy.covariance(X, self.posterior)
+        variance = np.einsum("njj,j->n", covariance, 1.0 / self.policy.scale_**2)
         return np.sqrt(np.maximum(variance, 0.0)), np.linalg.norm(P, axis=1)

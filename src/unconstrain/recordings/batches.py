@@ -64,6 +64,11 @@ class Batches:
         """The numbers of state and action dimensions."""
         return self._first.states.shape[1], self._first.actions.shape[1]
 
+    @property
+    def space(self) -> None:
+        """None: arrays do not say what states are."""
+        return
+
     def along_episodes(self) -> "Batches":
         """Return the same source, in whose blocks no samples of an episode that follow each other are torn apart.
 

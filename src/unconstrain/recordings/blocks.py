@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from unconstrain.recordings.notes import Note
 from unconstrain.samples import Samples
+from unconstrain.spaces import Space
 
 Array = NDArray[np.float64]
 
@@ -107,6 +108,11 @@ class Source(Protocol):
     @property
     def scalar_actions(self) -> bool:
         """Whether the actions were of shape (N,)."""
+        ...
+
+    @property
+    def space(self) -> Space | None:
+        """What states are, where that is known."""
         ...
 
     @property

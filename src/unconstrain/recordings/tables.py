@@ -53,6 +53,11 @@ class Tables:
         return True
 
     @property
+    def space(self) -> None:
+        """What states are."""
+        return None
+
+    @property
     def scalar_actions(self) -> bool:
         """Whether the actions were of shape (N,)."""
         return False

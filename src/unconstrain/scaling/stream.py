@@ -211,7 +211,8 @@ def begin(
     derived = U is None
     probe = clone(policy) if not goes_on else deepcopy(policy)
     X, U = check_samples(probe, X, X if U is None else U, reset=not goes_on)
-    U = np.ones_like(X) if derived else U.reshape(len(U), -1)
+    space = source.space
+    U = np.ones((len(X), space.n_actions if space else X.shape[1])) if derived else U.reshape(len(U), -1)
     longest = 0.0 if derived else float(np.linalg.norm(U, axis=1).max(initial=0.0))
     if goes_on:
         if U.shape[1] != policy.n_actions_:
@@ -222,7 +223,7 @@ def begin(
         longest = max(longest, accumulator.total.longest)
     else:
         # Where a sample does not move at all, places are needed all the same.
-        accumulator = policy.start(Samples(X, U if U.any() else np.ones_like(U)))
+        accumulator = policy.start(Samples(X, U if U.any() else np.ones_like(U)), space)
     accumulator.longest = max(accumulator.longest, longest)
     return accumulator
 

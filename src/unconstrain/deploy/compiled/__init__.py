@@ -11,6 +11,8 @@ A compiled policy is of one of five kinds, named by what it evaluates. b are nor
 | potential | -∇ wᵀb(x)                         | centers (M, n), width, weights (M,)                                 |
 | additive  | Σ_j f_j(x_j), f_j of polynomials  | breaks (n, K), origins (n, K+1), polynomials (n, K+1, degree+1, d)  |
 
+`InSpace` is one of these behind what a space makes of the state, and before a scale.
+
 On one state the cost is that of entering NumPy. So arrays are laid out for each step to be one call, intermediate
 results go to buffers that each thread has for itself, and the largest activation is taken out of the others only far
 away from all centres, where they would underflow otherwise.
@@ -19,12 +21,14 @@ away from all centres, where they would underflow otherwise.
 from unconstrain.deploy.compiled.additive import Additive
 from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, RadialBasis
+from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
 from unconstrain.deploy.compiled.loading import load_compiled
 
 __all__ = [
     "Additive",
     "CompiledPolicy",
+    "InSpace",
     "Linear",
     "LocallyLinear",
     "Potential",

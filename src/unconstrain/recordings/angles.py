@@ -25,7 +25,7 @@ UNIT = 0.02
 
 
 def unwrap(
-    X: Array, names: Sequence[str], chosen: Sequence[int] | None, file: str
+    X: Array, names: Sequence[str], chosen: Sequence[int] | None, file: str, rotations: Sequence[int] = ()
 ) -> tuple[Array, tuple[Note, ...]]:
     """Count the turns of angles on, and give quaternions the sign of the one before, in one episode.
 
@@ -39,6 +39,8 @@ def unwrap(
         Which states are angles; None to recognise angles and quaternions by their jumps.
     file : str
         The file, as notes call it.
+    rotations : sequence of int
+        Which states are known to be parts of rotations, and are left alone.
 
     Returns
     -------
@@ -49,7 +51,9 @@ def unwrap(
     notes: list[Note] = []
     result = X
     for i in range(X.shape[1]) if chosen is None else chosen:
-        found = _turn(X[:, i], chosen is not None)
+        if i in rotations:
+            continue
+        found = find_turn(X[:, i], chosen is not None)
         if found is None:
             continue
         turn, wraps = found
@@ -61,13 +65,16 @@ def unwrap(
     if chosen is not None:
         return result, tuple(notes)
     for first in quaternions(X):
+        if first in rotations:
+            continue
         part = slice(first, first + 4)
         turned = np.sum(X[1:, part] * X[:-1, part], axis=1) < 0
         result = result.copy() if result is X else result
         result[1:, part] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
+        called = ",".join(names[part])
         text = (
-            f"the quaternion {_plain(', '.join(names[part]))} changes its sign {{}}, and is given that of the one "
-            'before; if it is none, give angle="none"'
+            f"the quaternion {_plain(called)} changes its sign {{}}, and is given that of the one before; "
+            f'rotation="{_plain(called)}" takes it for a rotation, and if it is none, give angle="none"'
         )
         notes.append(Note("angle", file, text, (int(turned.sum()),), ("time",)))
     return result, tuple(notes)
@@ -98,11 +105,21 @@ def quaternions(X: Array) -> list[int]:
     return found
 
 
-def _turn(x: Array, certain: bool) -> tuple[str, int] | None:
-    """Return at what x (N,) wraps and how often, or None where it does not.
+def find_turn(x: Array, certain: bool) -> tuple[str, int] | None:
+    """Find at what numbers wrap, and how often.
 
-    Unless it is `certain` that it is an angle, all of it has to lie within one turn, and each jump to lead from one end
-    of that turn to the other.
+    Parameters
+    ----------
+    x : ndarray of shape (N,)
+        Of one episode.
+    certain : bool
+        Whether it is certain that they are an angle. Otherwise all of them have to lie within one turn, and each jump
+        has to lead from one end of that turn to the other.
+
+    Returns
+    -------
+    (str, int) or None
+        A key of `TURNS`, and how often; None where they do not wrap.
     """
     if len(x) < 2:
         return None

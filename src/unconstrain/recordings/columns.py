@@ -15,7 +15,7 @@ DIFFERENTIATE = "differentiate"
 """What `action` is where the actions are the derivative of the states."""
 
 NO_ANGLE = "none"
-"""What `angle` is where no column is to be taken for an angle."""
+"""What `angle` is where no column is to be taken for an angle, and `rotation` where none is for a rotation."""
 
 
 START, GOAL = "start", "goal"
@@ -49,10 +49,17 @@ class Columns:
         NaN where it is not known.
     relative_to : "start", "goal", or list of columns
         What states are relative to: where each episode starts, or ends; or as many columns as there are states, such as
-        an object's position. Given actions are made relative to columns that move as well, which needs `time`.
+        an object's position. Given actions are made relative to columns that move as well, which needs `time`. Poses
+        are expressed in the frame of others; positions x, y, z too, where the position and the quaternion of a frame
+        are given.
     angle : column, or list of columns
-        The states that are angles, in radians or degrees, whose turns are counted on where they wrap. By default
-        angles, and quaternions that change their sign, are recognised by their jumps; "none" takes all as they are.
+        The states that are angles, in radians or degrees, the same after a turn. Turns are counted on where they wrap.
+        By default angles are recognised by their jumps; "none" takes all as they are.
+    rotation : list of columns
+        The states that are rotations: four columns of a quaternion, three of a rotation vector or of roll, pitch and
+        yaw, or nine of a matrix, row by row; several rotations one after the other. Names tell which part of a
+        quaternion is which; where they do not, list them in the order x, y, z, w. Actions are angular velocities then,
+        in radians a second. With x, y and z before it, a rotation is a pose.
     topic : str, or list of str
         For ROS bags: the topic whose messages are the samples, and whose fields are the columns. With several, columns
         are called `/topic/field`, and the others are aligned to the stamps of the first. By default the only topic with
@@ -74,10 +81,11 @@ class Columns:
     projections: Keys | None = None
     relative_to: Keys | None = None
     angle: Keys | None = None
+    rotation: Keys | None = None
     topic: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("state", "action", "force", "projections", "relative_to", "angle"):
+        for name in ("state", "action", "force", "projections", "relative_to", "angle", "rotation"):
             keys = getattr(self, name)
             if isinstance(keys, str | int | list | tuple | None):
                 continue

@@ -1,4 +1,4 @@
-"""What the actions of recordings are is decided once for all of them, by the first."""
+"""What the states and actions of recordings are is decided once for all of them, by the first."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,8 +9,12 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.actions import ActionKind, find_kind
 from unconstrain.recordings.blocks import number_values
 from unconstrain.recordings.columns import DIFFERENTIATE
+from unconstrain.recordings.notes import Note
 from unconstrain.recordings.pieces import Piece, read_numbers
 from unconstrain.recordings.recording import FIRST_ROWS, Recording, distinct
+from unconstrain.recordings.states import FirstRows, arrange_reference, find_frame, find_space, in_frame
+from unconstrain.spaces import Numbers, Space
+from unconstrain.spaces.frames import takes_frame
 
 
 def decide_kind(recordings: Sequence[Recording], given: str | None) -> tuple[Recording, ...]:
@@ -51,9 +55,85 @@ def decide_kind(recordings: Sequence[Recording], given: str | None) -> tuple[Rec
     return tuple(replace(_differentiated(each), kind=kind) for each in recordings)
 
 
+def decide_space(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], tuple[Note, ...]]:
+    """Decide what states are: by the first recording where it is not given.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Their space is numbers as yet.
+
+    Returns
+    -------
+    tuple of Recording
+        Each with its space, and what it is relative to in the order of its states.
+    tuple of Note
+        What was guessed.
+
+    Raises
+    ------
+    DataError
+        Columns that are given as a rotation are none, or states cannot be relative to what is given.
+    """
+    first = recordings[0]
+    space, notes = _find_space(first)
+    if not first.roles.action and not first.saves:
+        names = space.action_names(first.roles.state_names)
+        recordings = [replace(each, roles=replace(each.roles, action_names=names)) for each in recordings]
+    _check_relative(first, space)
+    every = []
+    for each in recordings:
+        roles = each.roles
+        if roles.reference:
+            order = arrange_reference(space, roles.reference_names)
+            roles = replace(roles, reference=tuple(roles.reference[i] for i in order))
+        every.append(replace(each, roles=roles, place=space))
+    return tuple(every), notes
+
+
+def _find_space(recording: Recording) -> tuple[Space, tuple[Note, ...]]:
+    roles, how, plain = recording.roles, recording.preparation, Numbers(len(recording.roles.state))
+    if recording.saves:
+        saved = recording.declared.space if recording.declared is not None else None
+        return saved or plain, ()
+    if not (roles.rotations or roles.angle or (roles.angle is None and recording.differentiates)):
+        return plain, ()
+    is_asked = bool(roles.rotations or roles.angle)
+    try:
+        rows = _read_first(recording)
+    except DataError:
+        if is_asked:
+            raise
+        return plain, ()  # what is wrong is told where it is read
+    space, notes = find_space(rows, roles, how, recording.shown)
+    if roles.rotations and roles.action and how.angular_velocity is None:
+        frame, found = find_frame(rows, space)
+        space, notes = in_frame(space, frame), (*notes, *found)
+    return space, notes
+
+
+def _check_relative(recording: Recording, space: Space) -> None:
+    roles, how, shown = recording.roles, recording.preparation, recording.shown
+    count, n = len(roles.reference), space.n_states
+    if count and count != n and not takes_frame(space, count):
+        raise DataError(
+            f"{shown}: relative_to= takes start, goal, or one column for each of the {n} states, and stands for "
+            f"{count} here"
+        )
+    if space.is_flat:
+        return
+    if how.moving_centre is not None and roles.rotations:
+        raise DataError(f"{shown}: moving_centre= is for numbers and angles, and some states are rotations")
+    if recording.is_relative and roles.action and len(roles.action) != space.n_actions:
+        raise DataError(
+            f"{shown}: the velocities of states that are {space.words} have {space.n_actions} numbers, and there are "
+            f"{len(roles.action)} actions, which cannot be made relative: choose other action columns"
+        )
+
+
 def _differentiated(recording: Recording) -> Recording:
     """Return the same recording, whose states are differentiated in place of the actions it has."""
-    names = tuple(f"{name}_dot" for name in recording.roles.state_names)
+    names = recording.recorded_space.action_names(recording.roles.state_names)
     roles = replace(recording.roles, action=(), policy=(), action_names=names)
     return replace(recording, roles=roles, columns=replace(recording.columns, action=DIFFERENTIATE))
 
@@ -63,6 +143,14 @@ def _find(recording: Recording) -> str:
     roles = recording.roles
     if len(roles.state) != len(roles.action) or roles.state == roles.action:
         return "velocity"
+    rows = _read_first(recording)
+    if rows.U is None or not len(rows.X):
+        return "velocity"
+    return find_kind(rows.X, rows.U, rows.codes, rows.time)
+
+
+def _read_first(recording: Recording) -> FirstRows:
+    roles = recording.roles
     time = () if roles.time is None else (roles.time,)
     episode = () if roles.episode is None else (roles.episode,)
     pieces: list[Piece] = []
@@ -72,9 +160,9 @@ def _find(recording: Recording) -> str:
             break
     pieces = [piece for piece in recording.complete(pieces) if len(piece.rows)]
     if not pieces:
-        return "velocity"
+        none = np.zeros((0, len(roles.state)))
+        return FirstRows(none, None, np.zeros(0, dtype=np.int64), None)
     both = read_numbers(pieces, (*roles.state, *roles.action), "state and action").astype(np.float64)
-    X, U = both[: len(roles.state)].T, both[len(roles.state) :].T
     codes = number_values(recording.labels(pieces))[0]
     order = np.argsort(codes, kind="stable")
     seconds = None
@@ -84,4 +172,6 @@ def _find(recording: Recording) -> str:
         seconds = (ticks - ticks[0])[order] / clock.ticks_a_second
     elif recording.timed:
         seconds = recording.count_time(codes)[order]
-    return find_kind(X[order], U[order], codes[order], seconds)
+    n = len(roles.state)
+    U = both[n:].T[order] if roles.action else None
+    return FirstRows(both[:n].T[order], U, codes[order], seconds)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from numbers import Real
 
 from unconstrain.errors import DataError
+from unconstrain.spaces.rotation import FRAMES
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Ticks a second."""
@@ -18,7 +19,17 @@ ACTION_KINDS = ("velocity", "target", "increment")
 
 TIME_AXES = ("first", "last")
 
-CHOICES = {"time_unit": tuple(TIME_UNITS), "action_is": ACTION_KINDS, "time_axis": TIME_AXES}
+ANGLE_UNITS = ("rad", "deg")
+
+ORDERS = (1, 2)
+
+CHOICES = {
+    "time_unit": tuple(TIME_UNITS),
+    "action_is": ACTION_KINDS,
+    "time_axis": TIME_AXES,
+    "angle_unit": ANGLE_UNITS,
+    "angular_velocity": FRAMES,
+}
 """Options that take one of some words."""
 
 
@@ -63,10 +74,19 @@ class Preparation:
         Which axis of a demonstration's arrays is time, in MATLAB, HDF5 and .npy files. By default it is found, which is
         noted.
 
+    angle_unit : {"rad", "deg"}, optional
+        The unit of angles, rotation vectors, and roll, pitch and yaw. By default it is found by their size, which is
+        noted.
+    angular_velocity : {"world", "body"}, optional
+        The frame of the angular velocities that actions of rotations are. Recorded ones are compared with the states by
+        default, which is noted; of others it is the world's.
+    order : int
+        2 adds velocities to the states, and makes accelerations the actions: for movements that cross themselves.
+
     Raises
     ------
     DataError
-        A number is not positive and finite, or the time unit or axis is unknown.
+        A number is not positive and finite, or a word is none of those that are known.
     """
 
     time_unit: str | None = None
@@ -82,6 +102,9 @@ class Preparation:
     force_threshold: float | None = None
     moving_centre: float | None = None
     time_axis: str | None = None
+    angle_unit: str | None = None
+    angular_velocity: str | None = None
+    order: int = 1
 
     def __post_init__(self) -> None:
         for name, words in CHOICES.items():
@@ -94,6 +117,8 @@ class Preparation:
             raise DataError(
                 "rate= says that the time column counts frames, and time_unit= that it holds times: leave out one"
             )
+        if isinstance(self.order, bool) or self.order not in ORDERS:
+            raise DataError(f"order must be 1 or 2, got {_shown(self.order)}")
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name in (*CHOICES, "drop") or value is None:

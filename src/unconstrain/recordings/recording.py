@@ -20,6 +20,7 @@ from unconstrain.recordings.roles import Roles
 from unconstrain.recordings.steps import runs
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.time import Clock
+from unconstrain.spaces import Numbers, SecondOrder, Space
 
 Codes = NDArray[np.int64]
 
@@ -74,6 +75,8 @@ class Recording:
         What recorded actions are.
     leader : Recording, optional
         The recording whose unit of time is taken where it has to be guessed.
+    place : Space, optional
+        What the states in the files are; by default numbers.
     """
 
     shown: str
@@ -89,6 +92,40 @@ class Recording:
     is_along_episodes: bool = False
     kind: ActionKind = VELOCITY
     leader: "Recording | None" = None
+    place: Space | None = None
+
+    @property
+    def recorded_space(self) -> Space:
+        """What the states in the files are."""
+        return self.place or Numbers(len(self.roles.state))
+
+    @property
+    def space(self) -> Space:
+        """What the states of samples are."""
+        return SecondOrder(self.recorded_space) if self.preparation.order == 2 else self.recorded_space
+
+    @property
+    def n_actions(self) -> int:
+        """The number d of action dimensions."""
+        return len(self.roles.action) or self.space.n_actions
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The names of the states of samples."""
+        names, space = self.roles.state_names, self.space
+        return space.state_names(names) if isinstance(space, SecondOrder) else names
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """The names of the actions of samples."""
+        if isinstance(self.space, SecondOrder):
+            return self.space.action_names(self.state_names)
+        return self.roles.action_names
+
+    @property
+    def changes_states(self) -> bool:
+        """Whether the states of samples are others than lie in the files, and not only smoother ones."""
+        return self.is_relative or self.preparation.order == 2
 
     @cached_property
     def n_rows(self) -> int:
@@ -108,7 +145,7 @@ class Recording:
         how = self.preparation
         asked = not (how.gap is how.max_speed is how.resample is None)
         by_time = any(how.drops(what) for what in ("duplicates", "short", "pauses"))
-        return self.differentiates or asked or by_time or self.kind.kind == "increment"
+        return self.differentiates or asked or by_time or self.kind.kind == "increment" or how.order == 2
 
     @property
     def timed(self) -> bool:
@@ -119,6 +156,8 @@ class Recording:
     def unwraps(self) -> bool:
         """Whether states are looked through for angles."""
         chosen = self.columns.angle
+        if self.roles.rotations and self.differentiates:
+            return True
         return chosen != NO_ANGLE and (self.differentiates or chosen is not None)
 
     @property

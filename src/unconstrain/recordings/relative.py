@@ -47,7 +47,7 @@ def moving_centre(values: Array, time: Array, seconds: float) -> Array:
     return centre
 
 
-def describe(to: object, seconds: float | None) -> str:
+def describe(to: object, seconds: float | None, *, in_frame: bool = False) -> str:
     """Say what states were taken relative to, and what that means for who uses the policy.
 
     Parameters
@@ -56,6 +56,8 @@ def describe(to: object, seconds: float | None) -> str:
         As given.
     seconds : float, optional
         Of the moving centre.
+    in_frame : bool
+        Whether states are expressed in the frame of that too.
 
     Returns
     -------
@@ -71,7 +73,8 @@ def describe(to: object, seconds: float | None) -> str:
         parts.append(f"the columns {to if isinstance(to, str | int) else ', '.join(map(str, to))}")  # type: ignore[call-overload]
     if seconds is not None:
         parts.append(f"their mean over some {seconds:g} s")
-    return f"states are relative to {', then to '.join(parts)}"
+    frame = ", in its frame" if in_frame and to is not None else ""
+    return f"states are relative to {', then to '.join(parts)}{frame}"
 
 
 def end_of(values: Array, which: str) -> Array:

@@ -27,6 +27,10 @@ class Roles:
     state_names, action_names : tuple of str
     angle : tuple of int or None
         Which of the states are angles; None where that is to be found.
+    rotations : tuple of tuple of int
+        Which of the states are a rotation, for each.
+    reference_names : tuple of str
+        Of `reference`.
     """
 
     state: tuple[Field, ...]
@@ -41,11 +45,15 @@ class Roles:
     state_names: tuple[str, ...]
     action_names: tuple[str, ...]
     angle: tuple[int, ...] | None = None
+    rotations: tuple[tuple[int, ...], ...] = ()
+    reference_names: tuple[str, ...] = ()
 
     @property
     def n_actions(self) -> int:
-        """The number d of action dimensions."""
-        return len(self.action or self.state)
+        """The number d of action dimensions; a rotation has three, in however many numbers it is written."""
+        if self.action:
+            return len(self.action)
+        return len(self.state) - sum(len(rotation) - 3 for rotation in self.rotations)
 
 
 def assign_roles(
@@ -97,22 +105,31 @@ def assign_roles(
         action,
         () if force is None else header.find("force", force),
         () if own is None or own.policy is None or not action else header.find("policy", own.policy),
-        _reference(header, columns, len(state), shown),
+        _reference(header, columns),
         None if columns.time is None else header.find_one("time", columns.time),
         None if columns.episode is None else header.find_one("episode", columns.episode),
         None if free is None else header.find_one("free", free),
-        () if stored is None else _projection_columns(header, stored, len(action or state)),
+        (),
         names if own is None or own.state_names is None else own.state_names,
         tuple(f"{name}_dot" for name in names) if not action else _names(header, action, "u"),
     )
     if own is not None and own.action_names is not None and action:
         roles = replace(roles, action_names=own.action_names)
+    found = _among_states(header, "angle", columns.angle, roles, shown)
+    roles = replace(
+        roles,
+        angle=found,
+        rotations=_group(_among_states(header, "rotation", columns.rotation, roles, shown) or (), shown),
+        reference_names=_names(header, roles.reference, "r"),
+    )
+    if stored is not None:
+        roles = replace(roles, projections=_projection_columns(header, stored, roles.n_actions))
     _check_lengths(header, roles, shown)
-    roles = replace(roles, angle=_angles(header, columns.angle, roles, shown))
     needs_time = ("gap", "max_speed", "min_duration", "resample", "moving_centre")
     untimed = [name for name in needs_time if getattr(preparation, name) is not None]
     untimed += [f'drop="{what}"' for what in ("duplicates", "pauses") if preparation.drops(what)]
     untimed += ["relative_to"] if roles.reference else []  # such columns may move
+    untimed += ["order"] if preparation.order > 1 else []
     if untimed and roles.time is None and preparation.rate is None:
         raise DataError(
             f"{shown}: {untimed[0]} needs to know the time of each sample; give time= or rate= too"
@@ -129,29 +146,35 @@ def assign_roles(
     return roles
 
 
-def _reference(header: Header, columns: Columns, n_states: int, shown: str) -> tuple[Field, ...]:
+def _reference(header: Header, columns: Columns) -> tuple[Field, ...]:
     keys = columns.relative_to
-    if keys is None or keys in (START, GOAL):
-        return ()
-    found = header.find("relative_to", keys)
-    if len(found) != n_states:
-        raise DataError(
-            f"{shown}: relative_to= takes start, goal, or one column for each of the {n_states} states, and "
-            f"stands for {len(found)} here"
-        )
-    return found
+    return () if keys is None or keys in (START, GOAL) else header.find("relative_to", keys)
 
 
-def _angles(header: Header, keys: Keys | None, roles: Roles, shown: str) -> tuple[int, ...] | None:
+def _among_states(
+    header: Header, role: str, keys: Keys | None, roles: Roles, shown: str
+) -> tuple[int, ...] | None:
+    """Find which of the states columns are; None where none are given."""
     if keys is None:
         return None
     if keys == NO_ANGLE:
         return ()
-    found = header.find("angle", keys)
+    found = header.find(role, keys)
     foreign = [field.called for field in found if field not in roles.state]
     if foreign:
-        raise DataError(f"{shown}: angle= names states, and {foreign[0]} is none; name it with state= too")
+        raise DataError(f"{shown}: {role}= names states, and {foreign[0]} is none; name it with state= too")
     return tuple(roles.state.index(field) for field in found)
+
+
+def _group(columns: tuple[int, ...], shown: str) -> tuple[tuple[int, ...], ...]:
+    """Cut the columns of several rotations into those of each."""
+    for width in (4, 9, 3):
+        if len(columns) % width == 0:
+            return tuple(columns[i : i + width] for i in range(0, len(columns), width))
+    raise DataError(
+        f"{shown}: rotation= takes four columns of a quaternion, three of a rotation vector or of roll, pitch and yaw, "
+        f"or nine of a matrix, for each rotation, and stands for {len(columns)} here"
+    )
 
 
 def _projection_columns(header: Header, keys: Keys, d: int) -> tuple[ColumnKey, ...]:

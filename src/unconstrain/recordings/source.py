@@ -98,7 +98,7 @@ class Recordings:
         """The names of states and actions; none where the source is arrays."""
         if not isinstance(self.source, Tables):
             return (), ()
-        first = self.source.recordings[0].roles
+        first = self.source.recordings[0]
         return first.state_names, first.action_names
 
     @property
@@ -236,9 +236,7 @@ class Recordings:
 
     @property
     def _loaded_bytes(self) -> float:
-        numbers = (
-            each.n_rows * (len(each.roles.state) + 2 * each.roles.n_actions) for each in self._in_pieces
-        )
+        numbers = (each.n_rows * (len(each.roles.state) + 2 * each.n_actions) for each in self._in_pieces)
         return 8.0 * sum(numbers)
 
     def _assemble(self, several: list[Loaded], labels: "_Labels", notes: tuple[Note, ...]) -> Demonstrations:
@@ -248,7 +246,7 @@ class Recordings:
         if isinstance(self.source, Tables):
             first = self.source.recordings[0]
             shared = self.source.shared
-            names = (first.roles.state_names, first.roles.action_names)
+            names = (first.state_names, first.action_names)
         numbers: dict[tuple, int] = {}
         codes = []
         for loaded in several:
@@ -280,6 +278,7 @@ class Recordings:
             projections=joined("projections"),
             forces=joined("forces"),
             free=joined("free"),
+            space=self.source.space,
             state_names=names[0],
             action_names=names[1],
             episode_labels=[labels.of[key] for key in numbers],
@@ -303,6 +302,7 @@ def open(
     projections: Keys | None = None,
     relative_to: Keys | None = None,
     angle: Keys | None = None,
+    rotation: Keys | None = None,
     topic: str | Sequence[str] | None = None,
     time_unit: str | None = None,
     rate: float | None = None,
@@ -317,6 +317,9 @@ def open(
     force_threshold: float | None = None,
     moving_centre: float | None = None,
     time_axis: str | None = None,
+    angle_unit: str | None = None,
+    angular_velocity: str | None = None,
+    order: int | None = None,
     columns: Columns | None = None,
     preparation: Preparation | None = None,
 ) -> Recordings:
@@ -333,7 +336,7 @@ def open(
         several. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states
         (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not
         known; or a function that returns such an iterable, which can then be read more than once.
-    state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
+    state, action, time, episode, force, free, projections, relative_to, angle, rotation : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
     topic : str, or list of str, optional
@@ -342,6 +345,8 @@ def open(
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
         What is done to the samples; see `Preparation`.
+    angle_unit, angular_velocity, order : optional
+        What states and actions are; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
     preparation : Preparation, optional
@@ -377,7 +382,8 @@ def open(
         Columns,
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
-            "projections": projections, "relative_to": relative_to, "angle": angle, "topic": topic,
+            "projections": projections, "relative_to": relative_to, "angle": angle,
+            "rotation": rotation, "topic": topic,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -388,7 +394,8 @@ def open(
             "time_unit": time_unit, "rate": rate, "action_is": action_is, "drop": drop, "resample": resample,
             "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
             "min_duration": min_duration, "force_threshold": force_threshold,
-            "moving_centre": moving_centre, "time_axis": time_axis,
+            "moving_centre": moving_centre, "time_axis": time_axis, "angle_unit": angle_unit,
+            "angular_velocity": angular_velocity, "order": order,
         },
     )  # fmt: skip
     if isinstance(source, Recordings):
@@ -439,7 +446,7 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
     ----------
     source : path, pattern, URI, several of them, Demonstrations, or batches of arrays
         See `open`.
-    state, action, time, episode, force, free, projections, relative_to, angle : column, or list of columns
+    state, action, time, episode, force, free, projections, relative_to, angle, rotation : column, or list of columns
         Which column is what; see `Columns`.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
@@ -447,6 +454,8 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
         What is done to the samples; see `Preparation`.
+    angle_unit, angular_velocity, order : optional
+        What states and actions are; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
     preparation : Preparation, optional

@@ -17,8 +17,12 @@ from unconstrain.recordings.pieces import Piece
 from unconstrain.recordings.reading import BEGINS, KIND, summarize, without_tallies
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.roles import is_named
+from unconstrain.spaces import Space
 
 HEAD_ROWS = 2
+
+SAMPLED_ROWS = 2**16
+"""Rows of a block from which a sample is drawn."""
 
 SAMPLED_GROUPS = 16
 """Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
@@ -34,9 +38,12 @@ class Tables:
     Parameters
     ----------
     recordings : tuple of Recording
+    guesses : tuple of Note
+        What was guessed of all of them.
     """
 
     recordings: tuple[Recording, ...]
+    guesses: tuple[Note, ...] = ()
 
     @cached_property
     def n_rows(self) -> int:
@@ -54,9 +61,9 @@ class Tables:
         return True
 
     @property
-    def space(self) -> None:
+    def space(self) -> Space:
         """What states are."""
-        return None
+        return self.recordings[0].space
 
     @property
     def scalar_actions(self) -> bool:
@@ -84,6 +91,9 @@ class Tables:
     def head(self) -> tuple[NDArray[Any], NDArray[Any] | None]:
         """Read a few states (N, n) and actions (N, d); None for actions that are yet to be differentiated."""
         first = self.recordings[0]
+        if first.changes_states:
+            samples = next(read_blocks(first, SAMPLED_ROWS)).load().samples
+            return samples.states[:HEAD_ROWS], samples.actions[:HEAD_ROWS]
         pieces = first.read_pieces(first.plain_keys())
         piece = next(piece for piece in pieces if len(piece.rows))
         X, U = first.read_plain([piece.slice(0, HEAD_ROWS) if first.preparation.drop is None else piece])
@@ -91,6 +101,8 @@ class Tables:
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any] | None]:
         """Read random rows, in order; all where there are no more. Of many row groups only some are read."""
+        if self.recordings[0].changes_states:
+            return self._sample_prepared(n_rows, random_state)
         if self.n_rows <= n_rows:
             return _joined([(each, list(each.read_pieces(each.plain_keys()))) for each in self.recordings])
         rng = np.random.default_rng(random_state)
@@ -234,7 +246,7 @@ class Tables:
         declared = [each.declared for each in self.recordings if each.declared is not None]
         said = dict.fromkeys(note for each in declared for note in each.notes)
         notes = [Note("saved", "", note) for note in said if self.as_saved or not note.startswith(BEGINS)]
-        notes += self.recordings[0].kind.note()
+        notes += [*self.guesses, *self.recordings[0].kind.note()]
         for what in OPTIONAL:
             missing = sum(what not in _present(each) for each in self.recordings)
             if 0 < missing < len(self.recordings):
@@ -245,11 +257,12 @@ class Tables:
     def without_projections(self) -> "Tables":
         """Return the same source, without the projections that files hold."""
         every = [replace(each, roles=replace(each.roles, projections=())) for each in self.recordings]
-        return Tables(tuple(every))
+        return Tables(tuple(every), self.guesses)
 
     def along_episodes(self) -> "Tables":
         """Return the same source, in whose blocks no samples of an episode that follow each other are torn apart."""
-        return Tables(tuple(replace(each, is_along_episodes=True) for each in self.recordings))
+        every = [replace(each, is_along_episodes=True) for each in self.recordings]
+        return Tables(tuple(every), self.guesses)
 
     @property
     def is_along_episodes(self) -> bool:
@@ -262,15 +275,34 @@ class Tables:
             replace(each, files=tuple(file.in_one_thread() for file in each.files))
             for each in self.recordings
         ]
-        return Tables(tuple(every))
+        return Tables(tuple(every), self.guesses)
 
     def identity(self) -> str:
         """Say what tells this source from another: the files, what is read of them, and how they are prepared."""
         about = [
-            ([file.identity() for file in each.files], each.roles, each.preparation, each.alone)
+            ([file.identity() for file in each.files], each.roles, each.preparation, each.alone, each.space)
             for each in self.recordings
         ]
         return repr(about)
+
+    def _sample_prepared(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Draw samples of a whole pass, as they come out of preparation."""
+        rng = np.random.default_rng(random_state)
+        keys, states, actions = np.zeros(0), [], []
+        for recording in self.recordings:
+            for block in read_blocks(recording, SAMPLED_ROWS):
+                samples = block.load().samples
+                keys = np.append(keys, rng.random(len(samples.states)))
+                states.append(samples.states)
+                actions.append(samples.actions)
+                if len(keys) > 4 * max(n_rows, SAMPLED_ROWS):
+                    kept = np.sort(np.argpartition(keys, n_rows)[:n_rows])
+                    keys = keys[kept]
+                    states, actions = [np.concatenate(states)[kept]], [np.concatenate(actions)[kept]]
+        kept = (
+            np.arange(len(keys)) if len(keys) <= n_rows else np.sort(np.argpartition(keys, n_rows)[:n_rows])
+        )
+        return np.concatenate(states)[kept], np.concatenate(actions)[kept]
 
     def _groups(self) -> Iterator[tuple[Recording, int, int, int]]:
         """Yield the row groups: recording, its number, rows, and the first row's number in the recording."""

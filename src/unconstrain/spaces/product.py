@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.spaces.base import Array, Space
-from unconstrain.spaces.rotation import QUATERNION, Rotation
 from unconstrain.spaces.numbers import Numbers
+from unconstrain.spaces.rotation import QUATERNION, Rotation
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,7 @@ class Product(Space):
             Of them.
         """
         ends = np.cumsum([part.n_states for part in parts]).tolist()
-        columns = tuple(
-            tuple(range(end - part.n_states, end)) for part, end in zip(parts, ends, strict=True)
-        )
+        columns = tuple(tuple(range(end - part.n_states, end)) for part, end in zip(parts, ends, strict=True))
         return cls(parts, columns)
 
     @property
@@ -87,7 +85,8 @@ class Product(Space):
     def action_names(self, names: Sequence[str]) -> tuple[str, ...]:
         """Name the velocities; see `Space.action_names`."""
         each = (
-            part.action_names([names[i] for i in own]) for part, own in zip(self.parts, self.columns, strict=True)
+            part.action_names([names[i] for i in own])
+            for part, own in zip(self.parts, self.columns, strict=True)
         )
         return tuple(name for one in each for name in one)
 

@@ -1,6 +1,5 @@
 """Rotations, however they are written."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -99,8 +98,9 @@ class Rotation(Space):
 
     def action_names(self, names: Sequence[str]) -> tuple[str, ...]:
         """Name the angular velocity after what the names share; see `Space.action_names`."""
-        shared = os.path.commonprefix(list(names))
-        stem = shared[: max(map(shared.rfind, "._/")) + 1]
+        stem = names[0][: max(map(names[0].rfind, "._/")) + 1]
+        if not all(name.startswith(stem) for name in names):
+            stem = ""
         return tuple(f"{stem}omega_{axis}" for axis in "xyz")
 
     def faults(self, X: Array) -> NDArray[np.bool_]:
@@ -233,4 +233,3 @@ class Rotation(Space):
 
 
 QUATERNION = Rotation()
-

@@ -98,9 +98,7 @@ class InSpace(CompiledPolicy):
         arrays = {**self.step.arrays, "space_scale": self.scale}
         if self.base is not None:
             arrays["space_base"] = self.base
-        write(
-            path, Kind.COMPILED_POLICY, {"kind": self.step.kind, "space": self.space.describe()}, arrays
-        )
+        write(path, Kind.COMPILED_POLICY, {"kind": self.step.kind, "space": self.space.describe()}, arrays)
 
     def magnitude(self, X: ndarray) -> float:
         """Return the largest term that is added up; see `CompiledPolicy`."""

@@ -11,6 +11,7 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns, Key, Keys
 from unconstrain.recordings.files import File
 from unconstrain.recordings.table import Header
+from unconstrain.spaces import Space
 
 ColumnKey = tuple[str, int]
 """A column's name, and which of the columns of that name it is, from 0."""
@@ -38,6 +39,8 @@ class Declared:
         choice of what to learn from; a file may hold them all.
     state_names, action_names, episode_labels, notes : tuple of str, optional
         As `Demonstrations` has them.
+    space : Space, optional
+        As `Demonstrations` has it.
     """
 
     columns: Columns
@@ -49,6 +52,7 @@ class Declared:
     state_names: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
     episode_labels: tuple[str, ...] = ()
+    space: Space | None = None
     notes: tuple[str, ...] = ()
 
 

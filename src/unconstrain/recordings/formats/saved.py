@@ -12,12 +12,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from unconstrain.demonstrations_file import FORMAT, NAMES
-from unconstrain.errors import ArchiveError, DataError
+from unconstrain.errors import ArchiveError, DataError, UnconstrainError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import ColumnKey, Declared
 from unconstrain.recordings.formats.npz import header_of, to_arrow
 from unconstrain.recordings.table import Header, row
+from unconstrain.spaces import from_description
 from unconstrain.storage import Kind, read
 from unconstrain.storage.archive import NOTE, damaged
 
@@ -194,7 +195,8 @@ def declare(about: Any, shown: str) -> Declared:
         force = roles.get("forces")
         projections = roles.get("projections")
         columns = Columns(state, action, single[0], episode)  # type: ignore[arg-type]
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        space = from_description(about["space"]) if "space" in about else None
+    except (UnconstrainError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations") from error
     if newer:
         raise DataError(f"{shown} was written by a newer release of unconstrain; upgrade to read it")
@@ -208,5 +210,6 @@ def declare(about: Any, shown: str) -> Declared:
         state_names=names["state_names"],
         action_names=names["action_names"],
         episode_labels=names["episode_labels"],
+        space=space,
         notes=names["notes"],
     )

@@ -5,11 +5,12 @@ from collections.abc import Callable
 from unconstrain.recordings.blocks import Loaded
 from unconstrain.recordings.preparing.labelling import label
 from unconstrain.recordings.preparing.motion import (
+    accelerate,
     differentiate_states,
     divide_increments,
+    follow_states,
     relate,
     resample,
-    unwrap_states,
 )
 from unconstrain.recordings.preparing.projecting import make_projections
 from unconstrain.recordings.preparing.reading import read
@@ -23,7 +24,7 @@ Step = Callable[[Portion, Rows], tuple[Rows, Notes]]
 
 STEPS: tuple[Step, ...] = (
     time_rows,
-    unwrap_states,
+    follow_states,
     split_rows,
     divide_increments,
     resample,
@@ -31,6 +32,7 @@ STEPS: tuple[Step, ...] = (
     relate,
     find_rest,
     make_projections,
+    accelerate,
 )
 """What lies between reading rows and labelling samples."""
 

@@ -35,6 +35,7 @@ def read(portion: Portion) -> tuple[Rows, Notes]:
     roles = recording.roles
     about_constraints = everything or recording.makes_projections
     X = _read(pieces, roles.state, "state")
+    none = np.zeros((len(X), recording.recorded_space.n_actions))
     projections = None
     if recording.reads_projections:
         checked = recording.columns.projections is not None
@@ -43,7 +44,7 @@ def read(portion: Portion) -> tuple[Rows, Notes]:
     rows = Rows(
         numbers=_numbers(pieces),
         X=X,
-        U=_read(pieces, roles.action, "action") if roles.action else np.zeros_like(X),
+        U=_read(pieces, roles.action, "action") if roles.action else none,
         codes=codes,
         episodes=episodes,
         origins=tuple((code, 0) for code in range(len(episodes.values))),

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
 BETWEEN = ("X", "U", "forces", "policy", "reference")
-"""What is interpolated linearly; of everything else a grid takes the nearest row."""
+"""What is interpolated linearly; of everything else a grid takes the nearest row. States that are no plain numbers are
+interpolated by `preparing.motion`."""
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,11 @@ class Recording:
         return not self.roles.action
 
     @property
+    def smooths(self) -> bool:
+        """Whether anything is differentiated over a window: the states, or columns that they are relative to."""
+        return self.differentiates or bool(self.roles.reference)
+
+    @property
     def splits(self) -> bool:
         """Whether samples are prepared by their time: split, resampled, differentiated, or left out by it."""
         if not self.timed:
@@ -108,7 +113,7 @@ class Recording:
         how = self.preparation
         asked = not (how.gap is how.max_speed is how.resample is None)
         by_time = any(how.drops(what) for what in ("duplicates", "short", "pauses"))
-        return self.differentiates or asked or by_time or self.kind.kind == "increment"
+        return self.smooths or asked or by_time or self.kind.kind == "increment"
 
     @property
     def timed(self) -> bool:
@@ -271,7 +276,7 @@ class Recording:
     @property
     def shortest(self) -> float:
         """How long (s) a fragment of a split episode has to last."""
-        window = self.preparation.window if self.differentiates else 0.0
+        window = self.preparation.window if self.smooths else 0.0
         return max(window, self.preparation.min_duration or 0.0)
 
     def keys(self, everything: bool) -> list[ColumnKey]:

@@ -39,11 +39,11 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     if rows.time is None or (recording.saves and not recording.splits):
         return rows, ()
     how = recording.preparation
-    needs_neighbours = recording.differentiates or recording.kind.kind == "increment"
+    needs_neighbours = recording.smooths or recording.kind.kind == "increment"
     if needs_neighbours and not how.drops("short"):
         _check_long_enough(recording, rows)
     gap = how.gap
-    if gap is None and not recording.differentiates and how.resample is None:
+    if gap is None and not recording.smooths and how.resample is None:
         gap = math.inf  # given actions do not depend on their neighbours, so a gap does no harm
 
     def long_enough(stamps: Array) -> bool:
@@ -51,7 +51,7 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
         lasts = stamps[-1] - stamps[0] >= (how.min_duration or 0.0) * (1 - 1e-9)
         if not lasts or (len(stamps) < 2 and recording.kind.kind == "increment"):
             return False
-        return not recording.differentiates or spans_window(stamps, how.window)
+        return not recording.smooths or spans_window(stamps, how.window)
 
     found = split(
         rows.X, rows.time, rows.codes, gap=gap, max_speed=how.max_speed, long_enough=long_enough,
@@ -66,7 +66,7 @@ def _check_long_enough(recording: Recording, rows: Rows) -> None:
     window = recording.preparation.window
     for label, own in zip(rows.episodes.labels, rows.runs(), strict=True):
         stamps = rows.time[own]
-        if len(stamps) < 2 or (recording.differentiates and not spans_window(stamps, window)):
+        if len(stamps) < 2 or (recording.smooths and not spans_window(stamps, window)):
             samples = f"{len(stamps)} sample{'' if len(stamps) == 1 else 's'}"
             raise DataError(
                 f"{recording.shown}: episode {label!r} has {samples} over {stamps[-1] - stamps[0]:.3g} s, too few to "

@@ -1,16 +1,16 @@
 """Recordings that lie in files, one after the other, as one source of samples."""
 
+import math
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.blocks import Block, Loaded, Motion
+from unconstrain.recordings.blocks import Array, Block, Loaded, Motion
 from unconstrain.recordings.loading import check_read, read_blocks
 from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.pieces import Piece
@@ -100,8 +100,11 @@ class Tables:
         return X[:HEAD_ROWS], None if U is None else U[:HEAD_ROWS]
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any] | None]:
-        """Read random rows, in order; all where there are no more. Of many row groups only some are read."""
-        if self.recordings[0].changes_states:
+        """Read random rows, in order; all where there are no more. Of many row groups only some are read.
+
+        Where the states of samples are others than lie in the files, they are prepared, and all of them are read.
+        """
+        if any(each.changes_states for each in self.recordings):
             return self._sample_prepared(n_rows, random_state)
         if self.n_rows <= n_rows:
             return _joined([(each, list(each.read_pieces(each.plain_keys()))) for each in self.recordings])
@@ -122,10 +125,25 @@ class Tables:
             for piece in recording.read_pieces(recording.plain_keys(), first, first + size):
                 low, high = np.searchsorted(picked, [at, at + len(piece.rows)])
                 if high > low:
-                    rows = piece.rows.take(pa.array(picked[low:high] - at))
-                    sampled.setdefault(number, []).append(piece._replace(rows=rows))
+                    sampled.setdefault(number, []).append(piece.take(picked[low:high] - at))
                 at += len(piece.rows)
         return _joined([(self.recordings[number], pieces) for number, pieces in sampled.items()])
+
+    def _sample_prepared(self, n_rows: int, random_state: int | None) -> tuple[Array, Array]:
+        rng = np.random.default_rng(random_state)
+        share = min(n_rows / max(self.n_rows, 1), 1.0)
+        X, U = [], []
+        for block in self.blocks(n_rows):
+            samples = block.load().samples
+            count = len(samples.states)
+            picked = np.sort(rng.choice(count, min(math.ceil(share * count), count), replace=False))
+            X.append(samples.states[picked])
+            U.append(samples.actions[picked])
+        states, actions = np.concatenate(X), np.concatenate(U)
+        if len(states) <= n_rows:
+            return states, actions
+        picked = np.sort(rng.choice(len(states), n_rows, replace=False))
+        return states[picked], actions[picked]
 
     def blocks(
         self, batch_rows: int, start: int = 0, stop: int | None = None
@@ -171,15 +189,12 @@ class Tables:
         After each recording it is checked that something of it is left, and moves.
         """
         for recording in self.recordings:
-            total = Motion(0, False, 0.0)
+            total = Motion()
             notes: tuple[Note, ...] = ()
             for block in read_blocks(recording, batch_rows, everything=True):
                 loaded = block.load()
-                own = loaded.motion
-                assert own is not None
-                total = Motion(
-                    total.n_samples + own.n_samples, total.moves or own.moves, max(total.fastest, own.fastest)
-                )
+                assert loaded.motion is not None
+                total += loaded.motion
                 notes = combine((*notes, *loaded.notes))
                 yield loaded
             check_read(recording, total, notes)
@@ -284,25 +299,6 @@ class Tables:
             for each in self.recordings
         ]
         return repr(about)
-
-    def _sample_prepared(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Draw samples of a whole pass, as they come out of preparation."""
-        rng = np.random.default_rng(random_state)
-        keys, states, actions = np.zeros(0), [], []
-        for recording in self.recordings:
-            for block in read_blocks(recording, SAMPLED_ROWS):
-                samples = block.load().samples
-                keys = np.append(keys, rng.random(len(samples.states)))
-                states.append(samples.states)
-                actions.append(samples.actions)
-                if len(keys) > 4 * max(n_rows, SAMPLED_ROWS):
-                    kept = np.sort(np.argpartition(keys, n_rows)[:n_rows])
-                    keys = keys[kept]
-                    states, actions = [np.concatenate(states)[kept]], [np.concatenate(actions)[kept]]
-        kept = (
-            np.arange(len(keys)) if len(keys) <= n_rows else np.sort(np.argpartition(keys, n_rows)[:n_rows])
-        )
-        return np.concatenate(states)[kept], np.concatenate(actions)[kept]
 
     def _groups(self) -> Iterator[tuple[Recording, int, int, int]]:
         """Yield the row groups: recording, its number, rows, and the first row's number in the recording."""

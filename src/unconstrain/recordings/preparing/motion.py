@@ -21,24 +21,7 @@ Array = NDArray[np.float64]
 
 
 def follow_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Count the turns of angles on, and keep the sign of quaternions, episode by episode.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        What was recognised.
-
-    Raises
-    ------
-    DataError
-        A row that should be a rotation is none.
-    """
+    """Count the turns of angles on, and keep the sign of quaternions, episode by episode."""
     recording, space = portion.recording, portion.recording.recorded_space
     if not space.is_flat and len(rows):
         _check_rotations(portion, rows, space, rows.X, "the states")
@@ -69,19 +52,7 @@ def _check_rotations(portion: Portion, rows: Rows, space: Space, X: Array, what:
 
 
 def divide_increments(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Make velocities of actions that are steps to the next state.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None: what actions are is noted once for all recordings.
-    """
+    """Make velocities of actions that are steps to the next state."""
     if rows.time is None or portion.recording.kind.kind != "increment":
         return rows, ()
     U = np.empty_like(rows.U)
@@ -91,19 +62,7 @@ def divide_increments(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 
 def resample(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Bring rows to even times, fragment by fragment, so that nothing is interpolated across a gap.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None.
-    """
+    """Bring rows to even times, fragment by fragment, so that nothing is interpolated across a gap."""
     rate = portion.recording.preparation.resample
     if rate is None or rows.time is None or not len(rows):
         return rows, ()
@@ -120,19 +79,7 @@ def resample(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 
 def differentiate_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Make the derivative of the states the actions, where none are given.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None.
-    """
+    """Make the derivative of the states the actions, where none are given."""
     if not (portion.recording.differentiates and len(rows)):
         return rows, ()
     assert rows.time is not None
@@ -145,17 +92,7 @@ def differentiate_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 def accelerate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     """Add velocities to the states, and make accelerations the actions, for a policy of second order.
 
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-        With velocities for actions.
-
-    Returns
-    -------
-    Rows
-        Without the true policy, which is that of velocities.
-    tuple of Note
+    The true policy is gone then, which is one of velocities.
     """
     recording = portion.recording
     if recording.preparation.order != 2:
@@ -178,19 +115,7 @@ def _velocities(space: Space, X: Array, time: Array, portion: Portion) -> Array:
 
 
 def relate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Take states and actions relative to what the options say.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-        Without the true policy, which is that of the states as they were.
-    tuple of Note
-    """
+    """Take states and actions relative to what the options say."""
     recording = portion.recording
     if not recording.is_relative:
         return rows, ()

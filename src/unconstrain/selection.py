@@ -34,6 +34,7 @@ from unconstrain.arrays import (
     check_samples,
     quote,
 )
+from unconstrain.constraints.nullspace import in_metric
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
@@ -50,6 +51,7 @@ from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
+from unconstrain.spaces import Space
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
@@ -262,10 +264,11 @@ def select_policy(
     """
     import joblib
 
+    space = X.space if isinstance(X, Demonstrations) else None
     states, U, groups, projections = unpack_demonstrations(X, U, groups, projections)
     X, U = check_samples(ParametricPolicy(), states, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
-    named = _name_candidates(candidates, X.shape[1], actions.shape[1])
+    named = _in_space(_name_candidates(candidates, X.shape[1], actions.shape[1]), space)
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
         check_lets_through(projections, actions)
@@ -291,11 +294,26 @@ def select_policy(
         raise PolicyError(
             f"none of the candidates could be fitted; the first, {rows[0].name}: {rows[0].problem}"
         )
-    judge = _choose_judge(held_out, X, U, groups, projections)
-    rows = [_judge(row, held_out[row.name], judge, actions) if row.problem is None else row for row in rows]
+    # All are judged in one metric, that of the first: the same for all unless they were given different scales.
+    metric = next(iter(held_out.values())).policy
+    judge = _choose_judge(held_out, metric, X, U, groups, projections)
+    rows = [
+        _judge(row, held_out[row.name], judge, metric, actions) if row.problem is None else row
+        for row in rows
+    ]
     rows.sort(key=lambda row: (row.problem is not None, row.error))
     policies = {name: found.policy for name, found in held_out.items()}
     return Selection(policies[rows[0].name], rows[0].name, Table(tuple(rows), judge.measure), policies)
+
+
+def _in_space(named: dict[str, Policy], space: Space | None) -> dict[str, Policy]:
+    """Tell candidates that do not know it what the states of demonstrations are."""
+    if space is None or space.is_flat:
+        return named
+    return {
+        name: policy if policy.space is not None else clone(policy).set_params(space=space)
+        for name, policy in named.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -365,29 +383,34 @@ def _try(
 
 def _choose_judge(
     held_out: Mapping[str, _HeldOut],
+    metric: Policy,
     X: np.ndarray,
     U: Any,
     groups: np.ndarray | None,
     projections: np.ndarray | None,
 ) -> Judge:
     """Find out which samples were free, by the candidate that says so best."""
-    actions = check_actions(U)
+    actions = metric.scaled(check_actions(U))
     risks = {found.policy.risk for found in held_out.values()}
     inferred = [found for found in held_out.values() if found.free is not None]
     none_free = np.zeros(len(actions))
-    inconsistency = Judge(INCONSISTENCY if projections is None else OF_WHAT_IS_KNOWN, none_free, projections)
+    known = projections
+    if known is not None and metric.model_.scale is not None:
+        known = in_metric(known, metric.model_.scale)
+    inconsistency = Judge(INCONSISTENCY if known is None else OF_WHAT_IS_KNOWN, none_free, known)
     if risks == {"inconsistency"}:
         return inconsistency
     if risks == {"corrected"}:
         measure = CORRECTED if projections is None else OF_WHAT_IS_KNOWN
         noise = min(found.policy.solution_.noise for found in held_out.values())
-        return Judge(measure, none_free, projections, noise)
+        return Judge(measure, none_free, known, noise)
     if risks == {"direct"}:
         measure = OF_WHOLE_ACTIONS if projections is None else OF_WHAT_IS_KNOWN
-        return Judge(measure, np.ones(len(actions)), projections)
+        return Judge(measure, np.ones(len(actions)), known)
     if not inferred:
         best = min(
-            held_out.values(), key=lambda found: np.mean(inconsistency.errors(actions, found.predictions))
+            held_out.values(),
+            key=lambda found: np.mean(inconsistency.errors(actions, metric.scaled(found.predictions))),
         )
         _, added = _try("", clone(best.policy).set_params(risk="adaptive"), X, U, groups, projections)
         if added is None:
@@ -396,13 +419,14 @@ def _choose_judge(
     likeliest = max(inferred, key=lambda found: found.log_likelihood)
     assert likeliest.free is not None
     measure = OF_WHAT_IS_SHOWN if projections is None else OF_WHAT_IS_KNOWN
-    return Judge(measure, likeliest.free, projections, likeliest.noise)
+    return Judge(measure, likeliest.free, known, likeliest.noise)
 
 
-def _judge(row: Row, found: _HeldOut, judge: Judge, U: np.ndarray) -> Row:
+def _judge(row: Row, found: _HeldOut, judge: Judge, metric: Policy, U: np.ndarray) -> Row:
     """Complete a candidate's row."""
-    errors = judge.errors(U, found.predictions)
-    missed = judge.unexplained(U, found.predictions)
+    U, predictions = metric.scaled(U), metric.scaled(found.predictions)
+    errors = judge.errors(U, predictions)
+    missed = judge.unexplained(U, predictions)
     means = np.array([errors[found.fold == k].mean() for k in np.unique(found.fold)])
     return replace(
         row,

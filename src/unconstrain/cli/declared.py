@@ -106,13 +106,24 @@ class Number(click.ParamType):
 
 
 class Numbers(click.ParamType):
-    """Finite numbers, separated by commas."""
+    """Finite numbers, separated by commas; or one of some words.
+
+    Parameters
+    ----------
+    words : sequence of str
+        What may stand in place of numbers.
+    """
 
     name = "numbers"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> list[float]:
+    def __init__(self, *, words: Sequence[str] = ()) -> None:
+        self.words = tuple(words)
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[float] | str:
         """Parse the text."""
-        if isinstance(value, list):
+        if isinstance(value, list) or value in self.words:
             return value
         try:
             numbers = [float(part) for part in value.split(",")]

@@ -141,15 +141,15 @@ def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) ->
         policy = None if model.is_chosen else model.build()
         return compare_risks(
             policy,
-            demos.states,
-            demos.actions,
-            demos.folds(folds),
-            projections=demos.projections,
+            demos,
+            groups=demos.folds(folds),
             progress=progress,
         )
 
 
 def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
+    import numpy as np
+
     from unconstrain.diagnostics import identifiability
     from unconstrain.policies.inferred import describe_inferred
 
@@ -182,6 +182,13 @@ def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
             f"warning: the policy learnt by {rival} is better by this measure than the one that is saved; "
             f"`--risk {better}` saves it instead"
         )
+    if not np.all(policy.scale_ == 1.0):
+        each = ", ".join(
+            f"{name} {value:.3g}" for name, value in zip(demos.action_names, policy.scale_, strict=True)
+        )
+        reporting.say(
+            f"scale of the actions, in which errors and noise are measured: {each}; --scale says otherwise"
+        )
     report = identifiability(policy, demos.states, demos.actions, projections=demos.projections)
     if 1.0 - report.determined_share >= WORTH_A_WARNING:
         reporting.say(
@@ -195,11 +202,11 @@ def _suggest(out: Path, demos: "Demonstrations | None" = None, *, needs_goal: bo
     reporting.say(f"policy: {out}")
     reporting.say("\nnext, on recordings the policy has not seen, or to see where it leads:")
     reporting.say(f"  unconstrain evaluate {reporting.shell_word(out)} OTHER_FILES...")
-    if demos is not None and demos.states.shape[1] == demos.actions.shape[1]:
+    if demos is not None and demos.space.n_actions == demos.actions.shape[1]:
         first, scales = demos.states[0], demos.states.std(axis=0)
         start = ",".join(reporting.shown_number(*pair) for pair in zip(first, scales, strict=True))
         # The start is one of those learnt from, so it is relative already, to a goal at the origin.
-        goal = f' --goal="{",".join("0" * len(first))}"' if needs_goal else ""
+        goal = f' --goal="{",".join(f"{x:g}" for x in demos.space.origin)}"' if needs_goal else ""
         reporting.say(
             f'  unconstrain rollout {reporting.shell_word(out)} --start="{start}"{goal} '
             "--steps 500 --dt 0.02 --overwrite"

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from unconstrain.cli.declared import Number, gathered, option
+from unconstrain.cli.declared import Number, Numbers, gathered, option
 from unconstrain.errors import PolicyError
 
 if TYPE_CHECKING:
@@ -34,14 +34,16 @@ class Model:
     centers: str | None = None
     n_centers: int | None = None
     width: float | None = None
+    scale: list[float] | str | None = None
 
     def __post_init__(self) -> None:
         placed = list(self._placed())
         if self.name == "linear" and placed:
             raise PolicyError(f"the linear model has no centres: leave out {placed[0]}=")
-        if self.is_chosen and (placed or self.alpha != "cv" or self.risk != "adaptive"):
+        chosen = placed or self.alpha != "cv" or self.risk != "adaptive" or self.scale is not None
+        if self.is_chosen and chosen:
             raise PolicyError(
-                "--model auto makes its own choices: leave out risk=, alpha=, centers=, n_centers= and width="
+                "--model auto makes its own choices: leave out risk=, alpha=, centers=, n_centers=, width= and scale="
             )
 
     @property
@@ -55,11 +57,12 @@ class Model:
         from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 
         placed = self._placed()
+        shared: dict[str, Any] = {"risk": self.risk, "alpha": self.alpha, "scale": self.scale}
         if self.name == "linear":
-            return ParametricPolicy(risk=self.risk, alpha=self.alpha)
+            return ParametricPolicy(**shared)
         if self.name == "rbf":
-            return ParametricPolicy(NormalizedRBF(**placed), risk=self.risk, alpha=self.alpha)
-        return LocallyLinearPolicy(**placed, risk=self.risk, alpha=self.alpha)
+            return ParametricPolicy(NormalizedRBF(**placed), **shared)
+        return LocallyLinearPolicy(**placed, **shared)
 
     def _placed(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in PLACED if getattr(self, name) is not None}
@@ -111,6 +114,13 @@ model = gathered(
             "--width",
             type=Number(),
             help="Standard deviation σ of the receptive fields, in the states' unit.",
+            section="Model",
+        ),
+        option(
+            "--scale",
+            type=Numbers(words=("auto",)),
+            help='What a length of one is along each action, "0.1,0.1,1", where these have different units; "auto" '
+            "takes how far the states spread. By default so too where radians stand beside other units.",
             section="Model",
         ),
     ],

@@ -16,8 +16,11 @@ from unconstrain.recordings.columns import START
 if TYPE_CHECKING:
     import numpy as np
 
+    from unconstrain.demonstrations import Demonstrations
     from unconstrain.policies.base import Policy
     from unconstrain.policies.unsure import Unsure
+    from unconstrain.spaces import Space
+    from unconstrain.spaces.frames import Frame
 
 
 @command(
@@ -74,6 +77,8 @@ def rollout(
     POLICY was saved by `unconstrain fit`.
     """
     outputs.check_outputs([policy], {"out": out, "figure": figure}, overwrite=overwrite)
+    import numpy as np
+
     from unconstrain import plot
     from unconstrain.policies import load_policy
     from unconstrain.policies.unsure import Unsure
@@ -81,14 +86,17 @@ def rollout(
     from unconstrain.simulation import rollout as integrate
 
     learnt = load_policy(policy)
-    _check_length(start, "start=", learnt.n_features_in_, "states")
+    space = learnt.space_
+    start = _with_rest(start, "start=", space)
     for row in block:
         _check_length(row, "block=", learnt.n_actions_, "actions")
-    origin = _find_origin(learnt, start, goal)
+    frame = _find_frame(learnt, start, goal)
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
+    begin, rows = np.array([start]), np.array(block).reshape(-1, learnt.n_actions_)
+    if frame is not None:
+        begin, rows = frame.into(begin), frame.constraint_into(rows) if len(rows) else rows
     with working("rolling out"):
-        inside = [at - zero for at, zero in zip(start, origin, strict=True)]
-        movement = integrate(learnt, inside, steps, dt, list(block) or None, stop_when=unsure)
+        movement = integrate(learnt, begin[0], steps, dt, rows if len(rows) else None, stop_when=unsure)
     taken = len(movement) - 1
     if unsure is not None and taken == 0:
         raise DataError(
@@ -96,7 +104,8 @@ def rollout(
             "larger share to stop_when_unsure="
         )
     last = movement.states[-1]  # as the policy has it
-    movement = replace(movement, states=movement.states + origin)
+    if frame is not None:
+        movement = _out_of(frame, movement)
     write_csv(movement, out)
     plot.save(plot.rollout_figure(movement), figure)
     end = zip(movement.state_names, movement.states[-1], movement.states.std(axis=0), strict=True)
@@ -107,25 +116,62 @@ def rollout(
     reporting.say(f"movement: {out}\nfigure: {figure}")
 
 
-def _find_origin(learnt: "Policy", start: list[float], goal: list[float] | None) -> list[float]:
-    """Return what the states of the policy are relative to, as states (n,): zeros where they are not."""
+def _find_frame(learnt: "Policy", start: list[float], goal: list[float] | None) -> "Frame | None":
+    """Return what the states of the policy are relative to; None where they are not."""
+    from unconstrain.spaces.frames import Frame, takes_frame
+
+    space = learnt.space_
     recording = getattr(learnt, "recording_", None)
     columns, preparation = recording if recording is not None else (None, None)
     to = None if columns is None else columns.relative_to
     if goal is not None:
         if to is None or to == START:
             raise DataError("goal= is for a policy learnt relative to a goal or to columns; leave it out")
-        _check_length(goal, "goal=", learnt.n_features_in_, "states")
-        return goal
+        at = goal if takes_frame(space, len(goal)) else _with_rest(goal, "goal=", space)
+        return Frame(space, tuple(at))
     if to == START:
-        return start
+        return Frame(space, tuple(_at_rest(start, space)))
     if to is not None:
         raise DataError(
             "the policy was learnt relative to a goal or to columns: say where that is with goal=, one number a state"
         )
     if preparation is not None and preparation.moving_centre is not None:
         reporting.say("note: start and movement are relative to the moving centre")
-    return [0.0] * len(start)
+    return None
+
+
+def _out_of(frame: "Frame", movement: "Demonstrations") -> "Demonstrations":
+    """Express a movement outside of the frame that the policy has it in."""
+    wanted = movement.policy
+    return replace(
+        movement,
+        states=frame.space.follow(frame.out_of(movement.states)),
+        actions=frame.velocities_out_of(movement.actions),
+        policy=None if wanted is None else frame.velocities_out_of(wanted),
+        projections=None,  # which files of text do not hold
+    )
+
+
+def _with_rest(numbers: list[float], option: str, space: "Space") -> list[float]:
+    """Check the numbers of a state; one without the velocity that belongs to it is at rest."""
+    from unconstrain.spaces import SecondOrder
+
+    if isinstance(space, SecondOrder) and len(numbers) == space.of.n_states:
+        return [*numbers, *[0.0] * space.n_actions]
+    _check_length(numbers, option, space.n_states, "states")
+    import numpy as np
+
+    if space.faults(np.array([numbers])).any():
+        raise DataError(f"{option} is none of these: {space.words}")
+    return numbers
+
+
+def _at_rest(start: list[float], space: "Space") -> list[float]:
+    from unconstrain.spaces import SecondOrder
+
+    return (
+        [*start[: space.of.n_states], *[0.0] * space.n_actions] if isinstance(space, SecondOrder) else start
+    )
 
 
 def _check_length(numbers: list[float], option: str, wanted: int, of: str) -> None:

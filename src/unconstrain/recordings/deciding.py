@@ -120,6 +120,8 @@ def _check_relative(recording: Recording, space: Space) -> None:
             f"{shown}: relative_to= takes start, goal, or one column for each of the {n} states, and stands for "
             f"{count} here"
         )
+    if count and takes_frame(space, count) and how.order == 2:
+        raise DataError(f"{shown}: order=2 and relative_to= a frame go together for states that are poses only")
     if space.is_flat:
         return
     if how.moving_centre is not None and roles.rotations:

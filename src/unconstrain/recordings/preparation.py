@@ -118,7 +118,7 @@ class Preparation:
                 "rate= says that the time column counts frames, and time_unit= that it holds times: leave out one"
             )
         if isinstance(self.order, bool) or self.order not in ORDERS:
-            raise DataError(f"order must be 1 or 2, got {_shown(self.order)}")
+            raise DataError(f"order must be 1 or 2, got {show(self.order)}")
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name in (*CHOICES, "drop") or value is None:

@@ -139,7 +139,7 @@ class Recording:
 
     @property
     def smooths(self) -> bool:
-        """Whether anything is differentiated over a window: states, velocities, or columns that states are relative to."""
+        """Whether anything is differentiated over a window: states, or what they are relative to, or velocities."""
         return self.differentiates or bool(self.roles.reference) or self.preparation.order == 2
 
     @property

@@ -215,6 +215,16 @@ def test_quaternions_keep_their_sign(tmp_path):
     noted(demos, "quaternion qw,qx,qy,qz", "6 times")
 
 
+def test_numbers_near_zero_beside_a_scalar_part_are_no_quaternion(tmp_path):
+    q = np.column_stack([np.cos(TIME / 20), np.sin(TIME / 20), 0 * TIME, 0 * TIME])
+    flipped = q * np.where((np.arange(200) // 30) % 2, -1.0, 1.0)[:, None]
+    columns = {name: flipped[:, i] for i, name in enumerate(("qw", "qx", "qy", "qz"))}
+    path = parquet(tmp_path / "a.parquet", px=1e-2 * X, py=1e-2 * X, pz=0 * X, **columns, t=TIME)
+    demos = uc.load(path, state=["px", "py", "pz", *columns], time="t")
+    np.testing.assert_array_equal(demos.states[:, 3:], q)
+    np.testing.assert_array_equal(demos.states[:, 0], 1e-2 * X)
+
+
 OPTIONS = [
     {},
     {"drop": "missing,duplicates,short,pauses"},

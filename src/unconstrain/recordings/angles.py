@@ -65,7 +65,7 @@ def unwrap(
     if chosen is not None:
         return result, tuple(notes)
     for first in quaternions(X):
-        if first in rotations:
+        if any(i in rotations for i in range(first, first + 4)):
             continue
         part = slice(first, first + 4)
         turned = np.sum(X[1:, part] * X[:-1, part], axis=1) < 0
@@ -92,17 +92,20 @@ def quaternions(X: Array) -> list[int]:
     list of int
         The first state of each.
     """
-    found: list[int] = []
+    if len(X) < 2:
+        return []
     squares = X**2
+    near: list[tuple[float, int]] = []
     for i in range(X.shape[1] - 3):
-        if found and i < found[-1] + 4:
-            continue
-        norms = np.sqrt(squares[:, i : i + 4].sum(axis=1))
-        if len(X) < 2 or np.any(np.abs(norms - 1.0) > UNIT):
-            continue
-        if np.any(np.sum(X[1:, i : i + 4] * X[:-1, i : i + 4], axis=1) < -0.5):
+        apart = float(np.abs(np.sqrt(squares[:, i : i + 4].sum(axis=1)) - 1.0).max())
+        if apart <= UNIT and np.any(np.sum(X[1:, i : i + 4] * X[:-1, i : i + 4], axis=1) < -0.5):
+            near.append((apart, i))
+    found: list[int] = []
+    # Three numbers near zero beside a scalar part near 1 look like a quaternion too, but less so than the real one.
+    for _, i in sorted(near):
+        if all(abs(i - other) >= 4 for other in found):
             found.append(i)
-    return found
+    return sorted(found)
 
 
 def find_turn(x: Array, certain: bool) -> tuple[str, int] | None:

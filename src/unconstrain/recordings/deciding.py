@@ -121,7 +121,9 @@ def _check_relative(recording: Recording, space: Space) -> None:
             f"{count} here"
         )
     if count and takes_frame(space, count) and how.order == 2:
-        raise DataError(f"{shown}: order=2 and relative_to= a frame go together for states that are poses only")
+        raise DataError(
+            f"{shown}: order=2 and relative_to= a frame go together for states that are poses only"
+        )
     if space.is_flat:
         return
     if how.moving_centre is not None and roles.rotations:

@@ -112,13 +112,13 @@ class Recording:
     @property
     def state_names(self) -> tuple[str, ...]:
         """The names of the states of samples."""
-        names, space = self.roles.state_names, self.space
-        return space.state_names(names) if isinstance(space, SecondOrder) else names
+        names = self.roles.state_names
+        return SecondOrder(self.recorded_space).state_names(names) if self.preparation.order == 2 else names
 
     @property
     def action_names(self) -> tuple[str, ...]:
         """The names of the actions of samples."""
-        if isinstance(self.space, SecondOrder):
+        if self.preparation.order == 2:
             return self.space.action_names(self.state_names)
         return self.roles.action_names
 

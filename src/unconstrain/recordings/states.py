@@ -294,7 +294,7 @@ def _find_angle(rows: FirstRows, i: int, roles: Roles, how: Preparation) -> tupl
     name = roles.state_names[i]
     degrees, guessed = _in_degrees(rows.X[:, [i]], LARGEST_RADIANS, [name], how)
     text = f"the angle {name} is taken to be in {'degrees' if degrees else 'radians'}; angle_unit= says otherwise"
-    note = [Note("unit of angle", "", text.replace("{}", "{ }"))] if guessed else []
+    note = [Note("turn", "", text.replace("{}", "{ }"))] if guessed else []
     return Angle(360.0 if degrees else 2 * np.pi), note
 
 

@@ -128,6 +128,7 @@ class Rotation(Space):
         """
         from scipy.spatial.transform import Rotation as Rotations
 
+        X = np.require(X, requirements="W")  # scipy takes no others
         if self.written == "rotvec":
             return Rotations.from_rotvec(X, degrees=self.degrees)
         if self.written == "euler":

@@ -27,6 +27,7 @@ from unconstrain.recordings.inspection.proposal import (
     Group,
     choose_actions,
     choose_episodes,
+    choose_rotations,
     choose_states,
     choose_time,
     key_of,
@@ -357,6 +358,8 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
+            if group.kind == "position" and len(group.places) == 3:
+                notes += _pose_notes(group, looked, reports)
             refused: list[str] = []
             for actions in choose_actions(group, reports, looked.columns):
                 share, guessed = _agreement(group, actions, clock, judged)
@@ -387,6 +390,8 @@ def _roles(
         time=None if clock is None else key_of(clock.place, looked.columns, at),
         episode=key_of(judged.episodes[0], looked.columns, at) if judged.episodes else None,
     )
+    if group.kind == "rotation":
+        columns = replace(columns, rotation=keys_of(group.places, looked.columns, at))
     if judged.topic is not None:
         columns = replace(columns, topic=judged.topic)
     unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
@@ -548,6 +553,17 @@ def _group_notes(group: Group, groups: Sequence[Group], looked: Looked) -> tuple
         listed = _several([_name(looked.names[i], i) for i in others])
         notes.append(f"{listed}: left out of the state; --state overrules the choice")
     return tuple(notes)
+
+
+def _pose_notes(group: Group, looked: Looked, reports: Sequence[ColumnReport]) -> tuple[str, ...]:
+    """Say how positions are learnt with the rotation beside them, where there is one quaternion."""
+    rotations = choose_rotations(reports)
+    if len(rotations) != 1:
+        return ()
+    at, columns = looked.positions, looked.columns
+    four = ",".join(map(str, keys_of(rotations[0], columns, at)))
+    three = ",".join(map(str, keys_of(group.places, columns, at)))
+    return (f"to learn poses: --state {three},{four} --rotation {four}, and no --action",)
 
 
 def _codes(place: int | None, looked: Looked) -> Codes:

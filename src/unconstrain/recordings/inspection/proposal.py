@@ -124,7 +124,7 @@ def choose_states(
 ) -> list[Group]:
     """Find the groups of columns that may be the state, best first.
 
-    Positions come first, then what is called a state, then angles, and last other numbers that change smoothly. Of
+    Positions come first, then what is called a state, angles, rotations, and last numbers that change smoothly. Of
     alike groups those without missing values come first, and then the order of the file decides.
 
     Parameters
@@ -149,6 +149,7 @@ def choose_states(
             if judged == kind and i not in taken and not ACTIONS & called:
                 found.setdefault(_stem(columns[i], kind), []).append(i)
         groups += _in_order(kind, _runs(found, columns), reports)
+    groups += [Group("rotation", places, "") for places in choose_rotations(reports)]
     numbers = [
         i
         for i, report in enumerate(reports)
@@ -162,6 +163,27 @@ def choose_states(
     for i in numbers:
         found.setdefault(columns[i].part_of, []).append(i)
     return groups + _in_order("number", found, reports)
+
+
+def choose_rotations(reports: Sequence[ColumnReport]) -> list[tuple[int, ...]]:
+    """Find the quaternions.
+
+    Parameters
+    ----------
+    reports : sequence of ColumnReport
+
+    Returns
+    -------
+    list of tuple of int
+        Where x, y, z and w of each are among the columns.
+    """
+    places = [i for i, report in enumerate(reports) if report.kind == "quaternion" and not report.missing]
+    found = []
+    for start in range(0, len(places) - 3, 4):
+        four = places[start : start + 4]
+        order = reports[four[0]].detail.removeprefix("order ")
+        found.append(tuple(four[order.index(axis)] for axis in "xyzw"))
+    return found
 
 
 def choose_actions(state: Group, reports: Sequence[ColumnReport], columns: Sequence[Column]) -> list[Group]:

@@ -13,7 +13,7 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, errors, features, metrics, plot, robots
+    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -65,6 +65,7 @@ __all__ = [
     "plot",
     "robots",
     "select_policy",
+    "spaces",
 ]
 
 _HOMES = {
@@ -102,6 +103,7 @@ _NAMESPACES = {
     "moments": "unconstrain.fitting.moments",
     "plot": "unconstrain.plot",
     "robots": "unconstrain.robots",
+    "spaces": "unconstrain.spaces",
 }
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours

@@ -122,10 +122,10 @@ def _on_grid(demos: Demonstrations, rate: int) -> Demonstrations:
             if np.abs(t - np.arange(count) / rate).max() > EVEN / rate:
                 count = int(np.floor(t[-1] * rate + 1e-6)) + 1
                 grid = np.arange(count) / rate
-                states, actions = (
-                    np.stack([np.interp(grid, t, column) for column in values.T], axis=1)
-                    for values in (states, actions)
-                )
+                right = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
+                share = np.clip((grid - t[right - 1]) / (t[right] - t[right - 1]), 0.0, 1.0)
+                states = demos.space.between(states[right - 1], states[right], share)
+                actions = actions[right - 1] + share[:, None] * (actions[right] - actions[right - 1])
         X.append(states)
         U.append(actions)
         codes.append(np.full(count, code))
@@ -137,6 +137,7 @@ def _on_grid(demos: Demonstrations, rate: int) -> Demonstrations:
         time=np.concatenate(times),
         state_names=demos.state_names,
         action_names=demos.action_names,
+        space=demos.space,
     )
 
 

@@ -99,7 +99,8 @@ class Matlab73(Hdf5):
 
         if not isinstance(item, h5py.Dataset):
             fields = super().node(item, opened, above)
-            return _struct_array(fields) if isinstance(fields, dict) else fields
+            # The file itself is no struct: a single variable that is a cell is not the field of one.
+            return _struct_array(fields) if isinstance(fields, dict) and above else fields
         about = item.attrs
         kind = about.get("MATLAB_class", b"")
         kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)

@@ -19,6 +19,7 @@ from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared, dama
 from unconstrain.recordings.formats.npz import to_arrow
 from unconstrain.recordings.formats.stacking import Stacked, find_lengths, stack
 from unconstrain.recordings.formats.trees import (
+    MATRICES,
     Demonstration,
     Found,
     Leaf,
@@ -39,9 +40,6 @@ STEPS = frozenset({"dt", "timestep", "time_step", "sample_time"})
 RATES = frozenset(
     {"fps", "hz", "fs", "rate", "freq", "frequency", "control_freq", "sample_rate", "sampling_rate"}
 )
-
-MATRICES = ((3, 3), (3, 4), (4, 4))
-"""Shapes of rotations and poses."""
 
 HELD = 0.5
 """Share of steps without a change from which a sensor is taken to have stopped, where elsewhere it changes."""
@@ -242,14 +240,9 @@ class Nested:
             array = np.asarray(fetch(each.parts[which]))
             if array.shape != each.parts[which].shape:
                 raise ValueError("an array has another shape than it promises")
-            if each.axes[which] is None:
-                array = np.repeat(array.reshape(-1)[:1], length)
-                if each.width:
-                    array = array[:, None]
-            else:
-                array = each.arrange(which, array)
-                if held is not None:
-                    held.add(name, array, label)
+            array = each.arrange(which, array, length)
+            if held is not None and not each.is_held:
+                held.add(name, array, label)
             values.append(to_arrow(array.astype(each.kind, copy=False)))
         return values
 

@@ -12,7 +12,9 @@ from unconstrain.recordings.formats.trees import Leaf, Odd
 ENDS = frozenset({"episode_ends", "episode_end", "ep_ends", "traj_ends", "trajectory_ends"})
 """Arrays of the number of samples up to the end of each episode, as Diffusion Policy writes them."""
 
-LENGTHS = frozenset({"episode_lengths", "episode_length", "ep_lengths", "ep_len", "traj_lengths", "traj_lens"})
+LENGTHS = frozenset(
+    {"episode_lengths", "episode_length", "ep_lengths", "ep_len", "traj_lengths", "traj_lens"}
+)
 """Arrays of the number of samples of each episode."""
 
 LAST = frozenset({

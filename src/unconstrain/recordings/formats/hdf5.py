@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.nested import RATES, STEPS, Fetch, Nested
+from unconstrain.recordings.formats.layout import RATES, STEPS
+from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -120,7 +121,7 @@ class Hdf5(Nested):
             for name, kind in fields.items()
         }
 
-    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+    def fetch(self, item: Any, index: tuple[Any, ...] | None) -> NDArray[Any]:
         """Read an array."""
         return item[()] if index is None else item[index]
 

@@ -39,6 +39,7 @@ class Matlab(Nested):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
+    episodes_last: ClassVar[bool] = True
     at_once: ClassVar[bool] = True
     kind: ClassVar[str] = "a MATLAB file"
 
@@ -85,6 +86,7 @@ class Matlab73(Hdf5):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = ()
+    episodes_last: ClassVar[bool] = True
     separator: ClassVar[str] = "."
     kind: ClassVar[str] = "a MATLAB file"
 
@@ -120,7 +122,7 @@ class Matlab73(Hdf5):
         stored = super().leaf(item)
         return Leaf(stored.shape[::-1], stored.kind, stored.where)
 
-    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+    def fetch(self, item: Any, index: tuple[Any, ...] | None) -> NDArray[Any]:
         """Read an array with its axes as MATLAB shows them."""
         array = super().fetch(item, None).T
         return array if index is None else array[index]

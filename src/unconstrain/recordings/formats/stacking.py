@@ -15,6 +15,9 @@ Shape = tuple[int, ...]
 MOST_HELD = 32
 """Numbers, at most, of an array that holds for a whole demonstration, as the position of its goal does."""
 
+HELD_FROM = 3
+"""Samples, at least, for each of these numbers: an array that is a little shorter than others is another mistake."""
+
 SPARE_FROM = 30
 """Samples of a demonstration from which arrays that have one more are taken to begin with the others."""
 
@@ -168,14 +171,14 @@ def _stack_one(
             return node.reason if len(nodes) == 1 else f"{node.reason} in demonstration {label}"
         if node.kind.kind not in "biufUSMm":
             return f"holds values of type {node.kind}"
+        if node.is_image:
+            return "holds bytes along several axes, as images do"
         axis = _time_axis(node.shape, length, leading, strict)
-        if axis is None and node.size != 1 and not _may_be_held(node, len(nodes) > 1):
-            return (
-                f"has shape {node.shape} in demonstration {label}, in which no axis has the {length} samples "
-                "that its arrays share"
-            )
+        if axis is None and node.size != 1 and not _may_be_held(node, length, len(nodes) > 1):
+            where = f" in demonstration {label}" if len(nodes) > 1 else ""
+            return f"has shape {node.shape}{where}, of which no axis has the {length} samples that other arrays share"
         width = node.size if axis is None else node.size // node.shape[axis]
-        if width > WIDEST or node.is_image:
+        if width > WIDEST:
             return f"holds {width} numbers a sample, as images do"
         widths.setdefault(width, label)
         parts.append(node)
@@ -215,10 +218,10 @@ def _time_axis(shape: Shape, length: int, leading: bool, strict: bool) -> int | 
     return places[0] if leading else places[-1]
 
 
-def _may_be_held(leaf: Leaf, repeats: bool) -> bool:
+def _may_be_held(leaf: Leaf, length: int, repeats: bool) -> bool:
     """Whether an array may hold for a whole demonstration: a short vector or, where these repeat, a matrix."""
     is_vector = sum(size != 1 for size in leaf.shape) < 2
-    fits = leaf.kind.kind in "biuf" and leaf.size <= MOST_HELD
+    fits = leaf.kind.kind in "biuf" and leaf.size <= min(MOST_HELD, length // HELD_FROM)
     return fits and (is_vector or (repeats and leaf.shape in MATRICES))
 
 

@@ -39,14 +39,14 @@ class Leaf:
     kind : numpy.dtype
     where : object
         What finds it in its file, or the array itself.
-    index : int or None
-        Which part of it along its first axis; None for all of it.
+    index : tuple or None
+        Which part of it, as an array is indexed; None for all of it.
     """
 
     shape: tuple[int, ...]
     kind: np.dtype
     where: Any
-    index: int | None = None
+    index: tuple[Any, ...] | None = None
 
     @property
     def size(self) -> int:
@@ -177,11 +177,15 @@ def choose_part(tree: dict[str, Node], part: str, separator: str) -> dict[str, N
     """
     every = dict(_parts(tree, ()))
     wanted = tuple(part.strip(separator).split(separator))
-    meant = [path for path in every if path == wanted] or [path for path in every if path[-len(wanted) :] == wanted]
+    meant = [path for path in every if path == wanted] or [
+        path for path in every if path[-len(wanted) :] == wanted
+    ]
     if len(meant) != 1:
         return [separator.join(path) for path in (meant or every)]
     chosen = every[meant[0]]
-    content = dict(chosen) if isinstance(chosen, dict) else {meant[0][-1]: chosen}
+    content: dict[str, Node] = {meant[0][-1]: chosen}
+    if isinstance(chosen, dict):
+        content = dict(chosen)
     above: Node = tree
     for step in meant[0]:
         assert isinstance(above, dict)
@@ -268,10 +272,7 @@ def _is_apart(other: Found, best: Found) -> bool:
 def _loose(tree: Mapping[str, Node]) -> int:
     """Return how many numbers are in arrays of a tree that do not repeat."""
     repeats = {
-        name
-        for kind in (_lists, _groups, _arrays)
-        for found in kind(tree, ())
-        for name in found.members
+        name for kind in (_lists, _groups, _arrays) for found in kind(tree, ()) for name in found.members
     }
     rest = {name: node for name, node in tree.items() if name not in repeats}
     return sum(
@@ -334,9 +335,7 @@ def _arrays(tree: Mapping[str, Node], path: tuple[str, ...]) -> Iterator[Found]:
             continue
         ordered = sorted(keys, key=lambda numbers: natural(numbered[stems[0]][numbers]))
         demonstrations = tuple(
-            Demonstration(
-                "/".join(numbers), {_plain(stem): tree[numbered[stem][numbers]] for stem in stems}
-            )
+            Demonstration("/".join(numbers), {_plain(stem): tree[numbered[stem][numbers]] for stem in stems})
             for numbers in ordered
         )
         members = tuple(numbered[stem][numbers] for numbers in ordered for stem in stems)

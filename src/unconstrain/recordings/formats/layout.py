@@ -240,16 +240,19 @@ def _split_batches(found: Found, separator: str, time_axis: str | None, episodes
         return found
     # Three dimensions or fewer can hardly be told from as many episodes, of which there are more as a rule.
     last = episodes_last and not deep[0][2] <= MOST_DIMENSIONS < deep[0][0]
-    inner: slice = slice(0, 2) if last else slice(1, 3)
+    inner = (0, 1) if last else (1, 2)
     first = deep[0]
     n_episodes, length = first[2 if last else 0], max(first)
     if time_axis is not None:
-        length = first[inner][0 if time_axis == "first" else 1]
+        length = first[inner[0 if time_axis == "first" else 1]]
+
+    def within(shape: tuple[int, ...]) -> tuple[int, ...]:
+        return shape[inner[0]], shape[inner[1]]
 
     def is_batch(shape: tuple[int, ...]) -> bool:
         matrices = shape[1:] if last else shape[:2]
         is_pose = matrices in MATRICES and shape[0 if last else 2] == length
-        return shape[2 if last else 0] == n_episodes and max(shape) == length in shape[inner] and not is_pose
+        return shape[2 if last else 0] == n_episodes and max(shape) == length in within(shape) and not is_pose
 
     if not all(map(is_batch, deep)):
         return found
@@ -257,7 +260,7 @@ def _split_batches(found: Found, separator: str, time_axis: str | None, episodes
     def split(leaf: Leaf, i: int) -> Leaf:
         shape = leaf.shape
         if len(shape) == 3:
-            return replace(leaf, shape=shape[inner], index=(..., i) if last else (i,))
+            return replace(leaf, shape=within(shape), index=(..., i) if last else (i,))
         if last and len(shape) == 2 and shape[1] == n_episodes and 1 not in shape:
             return replace(leaf, shape=shape[:1], index=(..., i))
         if not last and shape[0] == n_episodes and leaf.size != length:

@@ -61,10 +61,16 @@ class Nested:
         other.time_axis = axis
         return other
 
-    def for_part(self, part: str) -> "Nested":
-        """Return the same file, of which one part is read; that there is no such part, `columns` says."""
+    def parts(self) -> tuple[str, ...]:
+        """Return the sets of demonstrations that there are, the one that is read first."""
+        found = self._table.found
+        own = (*found.path, *(found.members if len(found.members) == 1 else ()))
+        return tuple(self.separator.join(path) for path in dict.fromkeys((own, *found.others)) if path)
+
+    def for_part(self, name: str) -> "Nested":
+        """Return the same file, of which nothing but this part is read. That it is not there, `columns` says."""
         other = copy(self)
-        other.part = part
+        other.part = name
         return other
 
     @classmethod

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
@@ -105,9 +106,11 @@ class NpyFolder(Nested):
                 below = inner.setdefault(folder, {})
                 assert isinstance(below, dict)
                 inner = below
+            with damage_named(each.file.shown, each.kind):
+                arrays = each.tree()
             fields = {
                 field: replace(node, where=(number, node.where)) if isinstance(node, Leaf) else node
-                for field, node in each.tree().items()
+                for field, node in arrays.items()
             }
             inner[name] = fields.get(ARRAY, fields)
         return tree

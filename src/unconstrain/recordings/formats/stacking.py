@@ -18,6 +18,9 @@ MOST_HELD = 32
 HELD_FROM = 3
 """Samples, at least, for each of these numbers: an array that is a little shorter than others is another mistake."""
 
+WIDER = 4
+"""How many times more dimensions than samples leave no doubt that an axis is not time."""
+
 SPARE_FROM = 30
 """Samples of a demonstration from which arrays that have one more are taken to begin with the others."""
 
@@ -174,10 +177,18 @@ def _stack_one(
         if node.is_image:
             return "holds bytes along several axes, as images do"
         axis = _time_axis(node.shape, length, leading, strict)
+        if axis is None and strict and length in node.shape and node.size != 1:
+            return f"has shape {node.shape}, in which time is not the {'first' if leading else 'last'} axis"
         if axis is None and node.size != 1 and not _may_be_held(node, length, len(nodes) > 1):
             where = f" in demonstration {label}" if len(nodes) > 1 else ""
             return f"has shape {node.shape}{where}, of which no axis has the {length} samples that other arrays share"
         width = node.size if axis is None else node.size // node.shape[axis]
+        if strict and axis is not None and width > MOST_HELD and width > WIDER * node.shape[axis]:
+            other = "last" if leading else "first"
+            return (
+                f"has {width} numbers a sample and but {node.shape[axis]} samples, if time is its "
+                f"{'first' if leading else 'last'} axis: time_axis={other} reads it the other way round"
+            )
         if width > WIDEST:
             return f"holds {width} numbers a sample, as images do"
         widths.setdefault(width, label)

@@ -39,12 +39,15 @@ class Stacked:
         Numbers a sample; 0 for an array of one number a sample.
     kind : numpy.dtype
         Of all parts.
+    clocks : tuple of Leaf
+        The stamps of each, where these are others than those of the table; none otherwise.
     """
 
     parts: tuple[Leaf, ...]
     axes: tuple[int | None, ...]
     width: int
     kind: np.dtype
+    clocks: tuple[Leaf, ...] = ()
 
     @property
     def is_held(self) -> bool:

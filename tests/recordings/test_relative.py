@@ -140,3 +140,14 @@ def test_columns_that_move_are_not_differentiated_across_a_gap(tmp_path):
     demos = uc.load(path, state="x", action="u", time="t", relative_to="g")
     np.testing.assert_allclose(demos.actions[:, 0], np.cos(t) - 2.0, atol=1e-9)
     assert demos.n_episodes == 2
+
+
+def test_rows_without_what_states_are_relative_to_can_be_left_out(reaches):
+    lines = reaches.read_text().splitlines()
+    lines[3] = lines[3].rsplit(",", 1)[0] + ","
+    reaches.write_text("\n".join(lines) + "\n")
+    given = {"relative_to": ["gx", "gy"]}
+    with pytest.raises(DataError, match=r"column 'gy' is empty at line 4; .* drop=\"missing\""):
+        read(reaches, **given).load()
+    demos = read(reaches, **given, drop="missing").load()
+    assert len(demos) == 399

@@ -299,19 +299,23 @@ class Recording:
         )
 
     def complete(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
-        """Leave out the rows without a state, an action or a stamp, where that is asked for."""
+        """Leave out the rows without a state, what it is relative to, an action or a stamp, where that is asked for."""
         if not self.preparation.drops("missing"):
             return pieces
         roles = self.roles
-        several = (("state", roles.state), ("action", roles.action))
+        several = (
+            ("state", roles.state),
+            ("relative_to", roles.reference),
+            ("action", roles.action),
+            ("time", () if roles.time is None else (roles.time,)),
+        )
         wanted = [(role, field) for role, fields in several for field in fields]
         complete = []
         for piece in pieces:
             missing = np.zeros(len(piece.rows), dtype=bool)
-            timed = roles.time is not None and roles.time.key in piece.at
-            for role, field in [*wanted, *([("time", roles.time)] if timed else [])]:
-                assert field is not None
-                missing |= piece.missing(field, role)
+            for role, field in wanted:
+                if field.key in piece.at:
+                    missing |= piece.missing(field, role)
             complete.append(piece.without(missing) if missing.any() else piece)
         return complete
 

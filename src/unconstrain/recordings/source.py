@@ -304,6 +304,7 @@ def open(
     angle: Keys | None = None,
     rotation: Keys | None = None,
     topic: str | Sequence[str] | None = None,
+    part: str | None = None,
     time_unit: str | None = None,
     rate: float | None = None,
     action_is: str | None = None,
@@ -341,6 +342,8 @@ def open(
         needs none of them.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
+    part : str, optional
+        Which sheet, section or set of a file is read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
@@ -383,7 +386,7 @@ def open(
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
             "projections": projections, "relative_to": relative_to, "angle": angle,
-            "rotation": rotation, "topic": topic,
+            "rotation": rotation, "topic": topic, "part": part,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -417,7 +420,7 @@ def open(
 def _of_tables(tables: Tables, columns: Columns, preparation: Preparation) -> Recordings:
     found = tables.recordings[0].kind
     if found.found:  # so that other recordings are read alike
-        preparation = replace(preparation, action_is=found.kind)
+        preparation = replace(preparation, action_is="velocity" if found.kind == "scaled" else found.kind)
     return Recordings(tables, columns, preparation)
 
 
@@ -453,6 +456,8 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         Which column is what; see `Columns`.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
+    part : str, optional
+        Which sheet, section or set of a file is read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional

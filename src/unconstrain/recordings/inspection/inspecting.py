@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.recordings.actions import find_kind
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.formats.base import Format
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
@@ -32,6 +33,7 @@ from unconstrain.recordings.inspection.proposal import (
     choose_time,
     key_of,
     keys_of,
+    rises_evenly,
 )
 from unconstrain.recordings.inspection.result import Inspection
 from unconstrain.recordings.inspection.timing import Timing, explained_by, judge_stamps
@@ -53,6 +55,13 @@ TRIED_ROWS = 3_000_000
 
 NANOSECOND_STEP = 1e5
 """Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
+
+LIKELY = {
+    "target": "commanded states",
+    "increment": "steps to the next state",
+    "scaled": "commands within -1 and 1 that a controller scales",
+}
+"""What actions are that are no velocities."""
 
 MOVING_TYPES = ("Odometry", "PoseStamped", "JointState", "TransformStamped", "Pose", "Path", "Twist")
 """The kinds of messages that are looked at first, where a file holds several tables."""
@@ -157,7 +166,10 @@ def _topics(file: Format) -> list[_Topic]:
 
 def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic]) -> Inspection:
     """Look into each table of a file, and take the first that holds a movement."""
-    listed = [f"topic {topic}" for topic in topics]
+    listed = []
+    if len(topics) > 1:
+        which = ", ".join(map(str, topics[:MOST_TOPICS]))
+        listed = [f"the topics that may hold a movement are {which}; --topic chooses others"]
     best: Inspection | None = None
     for topic in topics[:MOST_TOPICS]:
         if topic.count == 0:
@@ -198,10 +210,16 @@ def _inspect(
     header = first[0].columns()
     names = [column.name for column in header.columns]
     alike = [f for f in found if [column.name for column in f[1][0].columns().columns] == names]
-    files = [file for _, formats, _ in alike for file in formats if file.at_once or any(file.row_groups)]
+    numbered = [
+        (number, file)
+        for number, (_, formats, _) in enumerate(alike)
+        for file in formats
+        if file.at_once or any(file.row_groups)
+    ]
+    files = [file for _, file in numbered]
     if not files:
         raise DataError(f"{shown} has no samples")
-    looked = look_at(files)
+    looked = look_at(files, [number for number, _ in numbered])
     notes = list(looked.notes)
     if len(alike) < len(found):
         others = next(f[0] for f in found if f not in alike)
@@ -216,10 +234,14 @@ def _inspect(
     ]
     declared = first[0].declared()
     knows = declared is not None and declared.columns.state is not None
-    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values)]
+    given = None if declared is None else declared.columns.episode
+    told = [i for i, column in enumerate(looked.columns) if given is not None and column.name == given]
+    named = told or choose_episodes(reports, looked.values, None)[0]
+    before = _codes(named[0] if named else None, looked)
+    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values, before)]
     clock = clocks[0] if clocks else None
     rising = None if clock is None or len(alike) > 1 else clock.seconds
-    episodes, is_guess = choose_episodes(reports, looked.values, rising)
+    episodes, is_guess = (told, False) if told else choose_episodes(reports, looked.values, rising)
     codes = _codes(episodes[0] if episodes else None, looked)
     timing = None if clock is None else judge_stamps(clock.seconds, codes)
     if clock is not None and timing is not None:
@@ -230,6 +252,7 @@ def _inspect(
         notes.append(
             f"episodes are told apart by {name}, which changes where the time starts anew; else give --episode"
         )
+    reports = _without_held(reports, looked, codes)
     notes += _oddities(reports, looked, codes)
     judged = _Judged(looked, reports, clocks, episodes, codes, topic)
     tried = _try(paths, judged, robot, knows, len(alike) == len(found))
@@ -238,7 +261,7 @@ def _inspect(
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
     rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
     return Inspection(
-        ", ".join(name for name, _, _ in alike),
+        _several([name for name, _, _ in alike]),
         rows,
         n_episodes,
         rate,
@@ -286,7 +309,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
     """Try proposals one after the other until one can be read."""
     if not alike:
         return _Tried(None, [], judged.reports)
-    if robot is not None:
+    if robot is not None and STATE in robot.features:
         proposals = _for_robot(judged)
     elif knows:
         proposals = iter([_Proposal(Columns(), Preparation())])
@@ -339,9 +362,12 @@ def _for_robot(judged: _Judged) -> Iterator[_Proposal]:
         if share > AGREES:
             yield _Proposal(Columns(), Preparation(), velocities=actions, positions=states)
             return
+        codes = _codes(episode, judged.looked)
+        kind = _kind_of_actions(_matrix(values, states), _matrix(values, actions), codes, seconds)
+        likely = LIKELY.get(kind, "commanded states, perhaps")
         text = (
-            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion): it may be the "
-            "commanded state, so the states are differentiated; --action overrules this"
+            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion), but {likely}, "
+            "so the states are differentiated; --action overrules this"
         )
         yield _Proposal(differentiated, Preparation(), (text,), positions=states)
         return
@@ -353,13 +379,23 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
     looked, reports = judged.looked, judged.reports
     clocks: list[_Clock | None] = [*judged.clocks[:2], None]
     episode = judged.episodes[0] if judged.episodes else None
+    counting = {
+        i
+        for i, report in enumerate(reports)
+        if report.kind in ("number", "position") and rises_evenly(looked.values[i], judged.codes)
+    }
     for clock in clocks:
-        taken = {i for i in (clock.place if clock else None, episode) if i is not None}
+        taken = {i for i in (clock.place if clock else None, episode) if i is not None} | counting
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
             if group.kind == "position" and len(group.places) == 3:
                 notes += _pose_notes(group, looked, reports)
+            clockwork = _several(
+                [_name(looked.names[i], i) for i in sorted(counting - {clock and clock.place})]
+            )
+            if clockwork:
+                notes = (*notes, f"{clockwork}: rises evenly, as a clock does, and is left out of the state")
             refused: list[str] = []
             for actions in choose_actions(group, reports, looked.columns):
                 share, guessed = _agreement(group, actions, clock, judged)
@@ -368,9 +404,16 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
                     yield from _roles(judged, group, actions, clock, (*notes, *note))
                 elif clock is not None:
                     listed = _several([_name(looked.names[i], i) for i in actions.places])
+                    kind = _kind_of_actions(
+                        _matrix(looked.values, group.places),
+                        _matrix(looked.values, actions.places),
+                        judged.codes,
+                        clock.seconds,
+                    )
+                    likely = f", but {LIKELY[kind]}" if kind in LIKELY else ""
                     refused.append(
                         f"{listed}: no derivative of the positions (of whose motion they explain "
-                        f"{max(share, 0.0):.0%}), so the states are differentiated; --action overrules this"
+                        f"{max(share, 0.0):.0%}){likely}, so the states are differentiated; --action overrules this"
                     )
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
@@ -440,6 +483,12 @@ def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judg
     return explained_by(X, V * step, rows, judged.codes), f", if samples are {step:.3g} s apart"
 
 
+def _kind_of_actions(states: Array, actions: Array, codes: Codes, seconds: Array) -> str:
+    """Return what actions are, as `find_kind` has it, of rows in any order of the episodes."""
+    order = np.argsort(codes, kind="stable")
+    return find_kind(states[order], actions[order], codes[order], seconds[order])
+
+
 def _clock(place: int, report: ColumnReport, looked: Looked) -> _Clock:
     values = looked.values[place]
     assert values is not None
@@ -495,6 +544,21 @@ def _time_notes(name: str, clock: _Clock, timing: Timing, reports: Sequence[Colu
     if others:
         notes.append(f"{', '.join(map(repr, others))} may be the time as well; --time overrules the choice")
     return notes
+
+
+def _without_held(reports: list[ColumnReport], looked: Looked, codes: Codes) -> list[ColumnReport]:
+    """Take columns that do not change within episodes for constant: a goal moves only from one to the next."""
+    within = np.diff(codes) == 0
+    if np.all(within) or not np.any(within):
+        return reports
+    return [
+        replace(report, kind="constant", detail="in each episode")
+        if report.kind not in ("time", "episode", "text", "empty", "constant", "index", "quaternion")
+        and (values := looked.values[i]) is not None
+        and not np.any(np.diff(values)[within])
+        else report
+        for i, report in enumerate(reports)
+    ]
 
 
 def _oddities(reports: Sequence[ColumnReport], looked: Looked, codes: Codes) -> list[str]:
@@ -570,11 +634,12 @@ def _codes(place: int | None, looked: Looked) -> Codes:
     """Return the episode of each row, as a number: by file and, if there is one, by a column."""
     if place is None:
         return np.unique(looked.files, return_inverse=True)[1].astype(np.int64)
+    # Their values mean the same in all files of a recording.
     own: Any = looked.values[place]
     if own is None:
         own = looked.texts[place]
     inner = np.unique(own, return_inverse=True)[1]
-    codes = looked.files * (int(inner.max()) + 1) + inner if len(inner) else inner
+    codes = looked.recordings * (int(inner.max()) + 1) + inner if len(inner) else inner
     return np.unique(codes, return_inverse=True)[1].astype(np.int64)
 
 

@@ -69,6 +69,8 @@ class Column:
     part_of: str = ""
     component: int | None = None
     width: int = 0
+    unit: str = ""
+    """What the file says its unit is, as `plain_unit` writes it; "" where it says nothing."""
 
 
 @dataclass(frozen=True)

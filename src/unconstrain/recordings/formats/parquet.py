@@ -78,6 +78,7 @@ class Parquet:
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
             batches = opened.iter_batches(DECODED, row_groups=groups, columns=names, use_threads=self.threads)
             while (rows := next(batches, None)) is not None:
+                rows = flatten(rows)
                 if order is None:
                     order = self._order(rows.schema, columns)
                 length, first = len(rows), at
@@ -134,7 +135,7 @@ class Parquet:
         if not sum(self.row_groups):
             raise DataError(f"{self.file.shown} has no samples")
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
-            first = next(opened.iter_batches(1))
+            first = flatten(next(opened.iter_batches(1)))
             return describe_columns(first, self.file.shown, sum(self.row_groups))
 
     def _open(self) -> Any:
@@ -148,6 +149,13 @@ class Parquet:
                 page_checksum_verification=True,
             )
         return pq.ParquetFile(self.file.path, buffer_size=BUFFERED, page_checksum_verification=True)
+
+
+def flatten(rows: Any) -> Any:
+    """Return a table or a batch without records: their components are called `name.component`."""
+    while any(pa.types.is_struct(field.type) for field in rows.schema):
+        rows = rows.flatten()
+    return rows
 
 
 def describe_columns(first: Any, shown: str, length: int) -> Header:

@@ -2,35 +2,24 @@
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import pyarrow as pa
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import ColumnKey, Declared, note_guesses
-from unconstrain.recordings.formats.parquet import describe_columns
-from unconstrain.recordings.table import Header, row
+from unconstrain.recordings.formats.base import ColumnKey, WholeFile, note_guesses
+from unconstrain.recordings.formats.parquet import describe_columns, flatten
+from unconstrain.recordings.formats.seconds import with_time
+from unconstrain.recordings.table import Header
 
 
-class Tabular:
+class Tabular(WholeFile):
     """A file that is read as a whole into one Arrow table; a subclass says how, in `load_table`.
 
     Parameters
     ----------
     file : File
     """
-
-    suffixes: ClassVar[tuple[str, ...]] = ()
-    at_once: ClassVar[bool] = True
-
-    def __init__(self, file: File) -> None:
-        self.file = file
-
-    @classmethod
-    def matches(cls, file: File) -> bool:
-        """Whether the content is of this format, as its first bytes tell."""
-        return False
 
     def load_table(self) -> tuple[Any, tuple[str, ...]]:
         """Return all columns as a `pyarrow.Table`, and notes on them. Raises `DataError` for a damaged file."""
@@ -42,10 +31,6 @@ class Tabular:
         if not len(table):
             raise DataError(f"{self.file.shown} has no samples")
         return describe_columns(table.slice(0, 1).combine_chunks(), self.file.shown, len(table))
-
-    def declared(self) -> Declared | None:
-        """Return nothing: such files say nothing of their columns but their names."""
-        return None
 
     @property
     def row_groups(self) -> tuple[int, ...]:
@@ -69,23 +54,11 @@ class Tabular:
         named = [name for name, _ in columns]
         yield start, pa.RecordBatch.from_arrays(arrays, names=named, metadata=note_guesses(notes))
 
-    def place(self, index: int) -> str:
-        """Say where in the file a row is."""
-        return row(index)
-
-    def in_one_thread(self) -> "Tabular":
-        """Return the same file."""
-        return self
-
-    def identity(self) -> str:
-        """Say what tells the file from others."""
-        return repr(self.file.identity())
-
     @cached_property
     def _loaded(self) -> tuple[Any, tuple[str, ...]]:
         table, notes = self.load_table()
-        while any(pa.types.is_struct(field.type) for field in table.schema):
-            table = table.flatten()
+        table, joined = with_time(flatten(table))
+        notes = (*notes, *joined)
         # Polars hands out text as views, which other columns of text do not know.
         views = {i: field for i, field in enumerate(table.schema) if pa.types.is_string_view(field.type)}
         for i, field in views.items():

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.recordings.units import UNITS
+
 Array = NDArray[np.float64]
 
 TIME = {
@@ -16,6 +18,7 @@ EPISODE = {
     "episode", "episodes", "run", "trial", "demo", "demonstration", "traj", "trajectory", "sequence", "rep",
     "repetition",
 }  # fmt: skip
+REST = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds", "usec", "usecs"}
 INDEX = {"frame", "frames", "index", "idx", "seq", "sample", "id", "count", "row", "number", "no", "sub"}
 FORCE = {"force", "forces", "wrench", "torque", "torques", "effort", "tau", "fx", "fy", "fz", "ft", "f"}
 VELOCITY = {
@@ -43,14 +46,6 @@ NEITHER = {
     "voltage",
 }
 """Words in the names of columns that say what these are, in small letters."""
-
-UNITS = {
-    "m": "m", "mm": "mm", "cm": "cm", "km": "km", "rad": "rad", "rads": "rad", "radians": "rad", "deg": "deg",
-    "degrees": "deg", "degree": "deg", "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms",
-    "milliseconds": "ms", "us": "us", "microseconds": "us", "ns": "ns", "nsec": "ns", "nsecs": "ns",
-    "nanoseconds": "ns", "n": "N", "nm": "Nm",
-}  # fmt: skip
-"""Units as names of columns write them."""
 
 FITTING = {
     "time": ("s", "ms", "us", "ns"),
@@ -272,6 +267,8 @@ def _judge_one(name: str, values: Array, unit: str | None) -> ColumnReport:
         return replace(report, kind="constant")
     if TIME & set(called) and forward > 0.8:
         return replace(report, kind="time", unit=unit_of(name, "time"))
+    if whole and REST & set(called):  # what is left of a second
+        return replace(report, kind="index")
     counts = whole and len(steps) > 1 and float(np.mean(steps == 1)) > 0.9
     if counts or (whole and INDEX & set(called)):
         return replace(report, kind="index")

@@ -1,0 +1,173 @@
+"""Which lines of a text are samples: not those where a logger began anew or broke off, nor what stands below a table."""
+
+import csv
+from dataclasses import dataclass
+
+from unconstrain.recordings.formats.text_lines import Layout, content, is_number, split_line
+from unconstrain.recordings.formats.text_numbers import MISSING
+
+FEWEST = 5
+"""Samples that a table must have for lines below it to be taken for something else."""
+
+LONGEST_FOOTER = 20
+"""Lines below a table."""
+
+PROBED = 20
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The samples of a text.
+
+    Parameters
+    ----------
+    lines : list of bytes
+    numbers : list of int
+        Of each line in the file, counted from 1.
+    begins : tuple of int
+        The samples before which the header comes again.
+    notes : tuple of str
+        What was left out.
+    """
+
+    lines: list[bytes]
+    numbers: list[int]
+    begins: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def find_rows(data: bytes, layout: Layout) -> Rows:
+    """Find the samples of a text.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole text, in UTF-8.
+    layout : Layout
+
+    Returns
+    -------
+    Rows
+    """
+    entries = list(content(data, layout))
+    notes: list[str] = []
+    if b"\0" in data:
+        whole = [entry for entry in entries if b"\0" not in entry[1]]
+        left = len(entries) - len(whole)
+        entries = whole
+        if left:
+            lines = "line" if left == 1 else "lines"
+            notes.append(f"left out {left} {lines} with bytes that are zero, as a logger that crashed leaves them")
+    entries, begins = _without_headings(data, entries, layout, notes)
+    if len(entries) >= FEWEST and begins[-1:] != [len(entries)]:
+        count = len(entries)
+        _leave_out_footer(entries, layout, notes)
+        if len(entries) == count:
+            _leave_out_half(data, entries, layout, notes)
+    return Rows(
+        [line for _, line in entries],
+        [number for number, _ in entries],
+        tuple(begin for begin in begins if 0 < begin < len(entries)),
+        tuple(notes),
+    )
+
+
+def begins_anew(data: bytes, layout: Layout) -> bool:
+    """Whether the header of a text comes again in it."""
+    if not layout.heading or data.count(layout.heading[0]) < 2:
+        return False
+    return bool(find_rows(data, layout).begins)
+
+
+def _without_headings(
+    data: bytes, entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]
+) -> tuple[list[tuple[int, bytes]], list[int]]:
+    """Leave out headers that come again, with the titles above them; return what is left, and where they were."""
+    if not layout.heading or data.count(layout.heading[0]) < 2:
+        return entries, []
+    heading = set(layout.heading)
+    kept: list[tuple[int, bytes]] = []
+    begins: list[int] = []
+    lines: list[int] = []
+    for number, line in entries:
+        if line.strip() not in heading:
+            kept.append((number, line))
+            continue
+        if line.strip() != layout.heading[0]:
+            continue
+        lines.append(number)
+        while kept and (not begins or len(kept) > begins[-1]) and _is_title(kept[-1][1], layout):
+            kept.pop()
+        begins.append(len(kept))
+    inner = [begin for begin in begins if 0 < begin < len(kept)]
+    if inner:
+        shown = ", ".join(map(str, lines[:3])) + (f" and {len(lines) - 3} more" if len(lines) > 3 else "")
+        notes.append(
+            f"the header comes again at line {shown}, and what follows is taken for another episode; episode= "
+            "names another column"
+        )
+    return kept, begins
+
+
+def _is_title(line: bytes, layout: Layout) -> bool:
+    first = _cells(line, layout)[:1]
+    return not first or first[0].strip()[:1].isalpha() or first[0].startswith("*") or not first[0].strip()
+
+
+def _leave_out_half(
+    data: bytes, entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]
+) -> None:
+    """Leave out a last line that was cut while it was written."""
+    if data.rstrip(b"\0")[-1:] in (b"\n", b"\r"):
+        return
+    number, line = entries[-1]
+    own = _cells(line, layout)
+    before = [_cells(other, layout) for _, other in entries[-PROBED:-1]]
+    is_short = len(own) < layout.width and not layout.is_padded
+    if len(own) == layout.width and all(len(cells) == layout.width for cells in before):
+        last, others = own[-1].strip(), {_decimals(cells[-1]) for cells in before}
+        is_short = (not last and all(cells[-1].strip() for cells in before)) or (
+            len(others) == 1 and -1 < _decimals(last) < min(others)
+        ) or (last.endswith(".") and not any(cells[-1].strip().endswith(".") for cells in before))  # fmt: skip
+        is_short = is_short or (last in ("-", "+") and all(is_number(cells[-1]) for cells in before))
+    if is_short:
+        entries.pop()
+        notes.append(f"the last line, {number}, is cut off, and left out")
+
+
+def _leave_out_footer(entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]) -> None:
+    """Leave out lines below the table that say something of it."""
+    probe = [_cells(line, layout) for _, line in entries[:PROBED]]
+    numbered = all(cells and any(c.isdigit() for c in cells[0]) for cells in probe)
+    kept = len(entries)
+    while kept > max(FEWEST, len(entries) - LONGEST_FOOTER):
+        cells = _cells(entries[kept - 1][1], layout)
+        filled = [cell.strip() for cell in cells if cell.strip()]
+        first = cells[0].strip() if cells else ""
+        is_word = any(map(str.isalpha, first)) and not is_number(first) and first.lower() not in MISSING
+        alone = len(filled) == 1 and layout.width > 1 and is_word
+        foreign = is_word and len(cells) != layout.width and not layout.is_padded
+        if not (alone or foreign or (numbered and is_word and not any(c.isdigit() for c in first))):
+            break
+        kept -= 1
+    if kept < len(entries):
+        first, last = entries[kept][0], entries[-1][0]
+        which = f"line {first} is" if first == last else f"lines {first} to {last} are"
+        said = " ".join(entries[kept][1].decode(errors="replace").split())
+        notes.append(f"{which} taken for a footer and left out: {said:.40}")
+        del entries[kept:]
+
+
+def _decimals(cell: str) -> int:
+    """Return how many digits a number has after its point or comma; -1 where it is no plain number."""
+    cell = cell.strip().replace(",", ".")
+    whole, _, rest = cell.partition(".")
+    return len(rest) if whole.lstrip("+-").isdigit() and (rest.isdigit() or not rest) else -1
+
+
+def _cells(line: bytes, layout: Layout) -> list[str]:
+    try:
+        return split_line(line.decode(errors="replace"), layout.delimiter)
+    except csv.Error:
+        return []
+

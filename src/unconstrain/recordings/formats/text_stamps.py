@@ -1,0 +1,118 @@
+"""Time that no column of a text holds as it is: at the rate that its header tells, or in two columns."""
+
+import re
+from collections.abc import Sequence
+
+from unconstrain.recordings.formats.text_made import JoinedTime, RowTime
+
+RATE = re.compile(
+    r"(?:(?:sampl\w*|update|frame|capture|camera|video|data|acquisition|record\w*|scan|output|measur\w*)[ _-]*)?"
+    r"(?:rate|frequency|freq|fps|hz)\b[^\d\n]{0,20}?(\d+(?:\.\d+)?)\s*(?:hz|fps)?\W*",
+    re.IGNORECASE,
+)
+TIMED = re.compile(
+    r"time|stamp|zeit|temps|clock|date|frame|tick|elapsed|count|^t$|^t[ _\[(.]|(^|[ _.])(m|u|n)?secs?", re.I
+)
+REST = re.compile(
+    r"(?P<stem>.*?)(?P<small>n|nano|u|micro)(?P<unit>s|secs?|seconds?)(?P<end>\W*)", re.IGNORECASE
+)
+WHOLE = ("s", "sec", "secs", "second", "seconds")
+
+EPOCH = range(1_000_000_000, 4_000_000_000)
+"""Seconds since 1970."""
+
+
+def find_rate(lines: Sequence[str]) -> float | None:
+    """Return the rate (Hz) that lines above a table tell, such as ``Sample Rate: 100 Hz``."""
+    for line in lines:
+        found = RATE.match(line.strip(" \t\"'#%/;,"))
+        if found and float(found[1]) > 0:
+            return float(found[1])
+    return None
+
+
+def tell_time(names: Sequence[str]) -> bool:
+    """Whether any name is that of the time."""
+    return any(map(TIMED.search, names))
+
+
+def make_time(
+    names: Sequence[str], body: Sequence[Sequence[str]], above: Sequence[str]
+) -> tuple[JoinedTime | RowTime | None, str]:
+    """Make the time that no column holds as it is.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the cells, "" where there are none.
+    body : sequence of sequence of str
+        The first samples.
+    above : sequence of str
+        What stands above the table.
+
+    Returns
+    -------
+    made : JoinedTime, RowTime or None
+    note : str
+    """
+    pair = find_pair(names)
+    if pair is not None:
+        seconds, rest, ticks = pair
+        note = f"time is made of {names[seconds]} and {names[rest]}; time= names another column"
+        return JoinedTime(seconds, rest, ticks), note
+    if not any(names):
+        if _begins_with_stamps(body):
+            return JoinedTime(0, 1), "time is made of the first two columns; time= names another column"
+        if body and len(body[0]) > 1 and _increases([row[0] for row in body]):
+            return None, ""
+    rate = None if tell_time(names) else find_rate(above)
+    if rate is None:
+        return None, ""
+    note = f"no column tells the time, so it is made of the rate of the header, {rate:g} Hz; rate= overrules this"
+    return RowTime(rate), note
+
+
+def find_pair(names: Sequence[str]) -> tuple[int, int, int] | None:
+    """Find two columns of which one holds seconds, and the other what is left of a second.
+
+    Parameters
+    ----------
+    names : sequence of str
+
+    Returns
+    -------
+    (int, int, int) or None
+        Which columns they are, and how many ticks of the second make a second.
+    """
+    places = {name.strip().lower(): i for i, name in enumerate(names)}
+    for i, name in enumerate(names):
+        found = REST.fullmatch(name.strip())
+        if found is None:
+            continue
+        stem, end = found["stem"].lower(), found["end"].lower()
+        for unit in (found["unit"].lower(), *WHOLE):
+            whole = places.get(f"{stem}{unit}{end}")
+            if whole is not None:
+                return whole, i, 10**9 if found["small"].lower().startswith("n") else 10**6
+    return None
+
+
+def _begins_with_stamps(body: Sequence[Sequence[str]]) -> bool:
+    """Whether lines begin with seconds since 1970 and with nanoseconds, as `ros2 topic echo --csv` writes."""
+    both = [(row[0].strip(), row[1].strip()) for row in body if len(row) > 2]
+    if len(both) < 2 or not all(a.isdecimal() and b.isdecimal() for a, b in both):
+        return False
+    stamps = [(int(a), int(b)) for a, b in both]
+    return (
+        all(seconds in EPOCH and rest < 10**9 for seconds, rest in stamps)
+        and max(rest for _, rest in stamps) > 10**6
+        and stamps == sorted(stamps)
+    )
+
+
+def _increases(cells: Sequence[str]) -> bool:
+    try:
+        numbers = [float(cell.replace(",", ".")) for cell in cells]
+    except ValueError:
+        return False
+    return len(numbers) > 1 and all(b > a for a, b in zip(numbers, numbers[1:], strict=False))

@@ -304,6 +304,7 @@ def open(
     relative_to: Keys | None = None,
     angle: Keys | None = None,
     topic: str | Sequence[str] | None = None,
+    part: str | None = None,
     time_unit: str | None = None,
     rate: float | None = None,
     action_is: str | None = None,
@@ -338,6 +339,8 @@ def open(
         needs none of them.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
+    part : str, optional
+        Which sheet, section or set of a file is read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
@@ -377,7 +380,7 @@ def open(
         Columns,
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
-            "projections": projections, "relative_to": relative_to, "angle": angle, "topic": topic,
+            "projections": projections, "relative_to": relative_to, "angle": angle, "topic": topic, "part": part,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -446,6 +449,8 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         Which column is what; see `Columns`.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
+    part : str, optional
+        Which sheet, section or set of a file is read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional

@@ -60,7 +60,7 @@ def test_the_control_frequency_gives_the_time(robomimic):
 
 
 def test_images_are_refused_with_a_reason(robomimic):
-    with pytest.raises(DataError, match="1728 numbers a sample, as images do"):
+    with pytest.raises(DataError, match="bytes along several axes, as images do"):
         uc.load(robomimic[0], state="obs/agentview_image", action="actions")
 
 

@@ -270,9 +270,9 @@ def test_the_tables_of_a_file_are_listed_and_looked_into(tmp_path, monkeypatch):
     path = write(tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase))
     monkeypatch.setattr("unconstrain.recordings.recognizing.recognize", Topical)
     found = uc.inspect(path)
-    assert found.notes[:2] == (
-        "topic /odom (nav_msgs/msg/Odometry, 300 messages)",
-        "topic /status (std_msgs/msg/String, 3 messages)",
+    assert found.notes[0] == (
+        "the topics that may hold a movement are /odom (nav_msgs/msg/Odometry, 300 messages), "
+        "/status (std_msgs/msg/String, 3 messages); --topic chooses others"
     )
     assert kinds(found) == ["time", "position", "position"]
     assert say("inspect", path, "--keys")[1].splitlines()[0] == "/odom (nav_msgs/msg/Odometry, 300 messages)"

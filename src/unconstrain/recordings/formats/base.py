@@ -230,6 +230,22 @@ def find_part(name: str | None, every: Sequence[str], shown: str) -> str | None:
 
 
 @runtime_checkable
+class HasParts(Protocol):
+    """What a format does too whose files may hold several tables side by side, of which one is read."""
+
+    part: str | None
+    """The one that the user names."""
+
+    def parts(self) -> tuple[str, ...]:
+        """Return what there is to choose from: sheets, sections of an export, files of an archive."""
+        ...
+
+    def for_part(self, name: str) -> Format:
+        """Return the same file, of which nothing but this part is read. That it is not there, `columns` says."""
+        ...
+
+
+@runtime_checkable
 class HasTopics(Protocol):
     """What a format does too whose files hold several tables, of which the user names some: topics of a bag."""
 
@@ -268,6 +284,33 @@ def narrow(opened: Format, topics: tuple[str, ...]) -> Format:
     if not isinstance(opened, HasTopics):
         raise DataError(f"{opened.file.shown} has no topics, as only ROS bags have: leave out topic=")
     return opened.for_topics(topics)
+
+
+def narrow_to_part(opened: Format, part: str | None) -> Format:
+    """Return a file of which one part is read.
+
+    Parameters
+    ----------
+    opened : Format
+    part : str or None
+        None for a file as it is.
+
+    Returns
+    -------
+    Format
+
+    Raises
+    ------
+    DataError
+        A part is given, and files of this format have none.
+    """
+    if part is None:
+        return opened
+    if not isinstance(opened, HasParts):
+        raise DataError(
+            f"{opened.file.shown} has no sheets, sections or sets to choose from: leave out part="
+        )
+    return opened.for_part(part)
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.nested import RATES, STEPS, Fetch, Nested
+from unconstrain.recordings.formats.layout import RATES, STEPS
+from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -22,7 +23,7 @@ BLOCKS = (512, 1024, 2048)
 MAY_BEGIN_LATER = (".hdf5", ".h5", ".mat")
 """Suffixes of files that are looked at further than at their beginning, which for others would be a request more."""
 
-ENVIRONMENT = "env_args"
+ENVIRONMENTS = ("env_args", "env_info")
 """Where robomimic and robosuite say how often a robot was controlled."""
 
 DEEPEST = 32
@@ -89,6 +90,7 @@ class Hdf5(Nested):
         if item.id in above:
             return Odd("is a group that contains itself")
         inner: dict[str, Node] = {}
+        steps = [*_steps(item)]
         for name in item:
             if name in ("#refs#", "#subsystem#"):  # where MATLAB keeps what cells refer to
                 continue
@@ -100,7 +102,8 @@ class Hdf5(Nested):
                 inner[name] = Odd("is a link to nothing")
                 continue
             inner[name] = self.node(part, opened, (*above, item.id))
-        for name, number in _steps(item):
+            steps += _steps(part) if isinstance(part, h5py.Dataset) else ()
+        for name, number in steps:
             inner.setdefault(name, Leaf((), number.dtype, number))
         return inner
 
@@ -118,7 +121,7 @@ class Hdf5(Nested):
             for name, kind in fields.items()
         }
 
-    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+    def fetch(self, item: Any, index: tuple[Any, ...] | None) -> NDArray[Any]:
         """Read an array."""
         return item[()] if index is None else item[index]
 
@@ -147,17 +150,18 @@ def is_hdf5(file: File) -> bool:
     return any(begin[at : at + len(MAGIC)] == MAGIC for at in BLOCKS)
 
 
-def _steps(group: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the attributes of a group that say how far samples are apart."""
-    for name in group.attrs:
+def _steps(item: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the attributes of a group or an array that say how far samples are apart."""
+    for name in item.attrs:
         if name.lower() in STEPS | RATES:
-            number = np.asarray(group.attrs[name])
+            number = np.asarray(item.attrs[name])
             if number.dtype.kind in "iuf" and number.size == 1:
                 yield name, number.reshape(())
-        elif name == ENVIRONMENT:
+        elif name in ENVIRONMENTS:
             try:
-                rate = float(json.loads(group.attrs[name])["env_kwargs"]["control_freq"])
-            except (ValueError, KeyError, TypeError, RecursionError):
+                about = json.loads(item.attrs[name])
+                rate = float(about.get("env_kwargs", about)["control_freq"])
+            except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
                 continue
             yield "control_freq", np.array(rate)
 

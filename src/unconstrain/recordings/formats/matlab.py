@@ -39,6 +39,7 @@ class Matlab(Nested):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
+    episodes_last: ClassVar[bool] = True
     at_once: ClassVar[bool] = True
     kind: ClassVar[str] = "a MATLAB file"
 
@@ -85,6 +86,7 @@ class Matlab73(Hdf5):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = ()
+    episodes_last: ClassVar[bool] = True
     separator: ClassVar[str] = "."
     kind: ClassVar[str] = "a MATLAB file"
 
@@ -99,7 +101,8 @@ class Matlab73(Hdf5):
 
         if not isinstance(item, h5py.Dataset):
             fields = super().node(item, opened, above)
-            return _struct_array(fields) if isinstance(fields, dict) else fields
+            # The file itself is no struct: a single variable that is a cell is not the field of one.
+            return _struct_array(fields) if isinstance(fields, dict) and above else fields
         about = item.attrs
         kind = about.get("MATLAB_class", b"")
         kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
@@ -119,7 +122,7 @@ class Matlab73(Hdf5):
         stored = super().leaf(item)
         return Leaf(stored.shape[::-1], stored.kind, stored.where)
 
-    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+    def fetch(self, item: Any, index: tuple[Any, ...] | None) -> NDArray[Any]:
         """Read an array with its axes as MATLAB shows them."""
         array = super().fetch(item, None).T
         return array if index is None else array[index]

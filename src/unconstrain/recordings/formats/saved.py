@@ -15,8 +15,8 @@ from unconstrain.demonstrations_file import FORMAT, NAMES
 from unconstrain.errors import ArchiveError, DataError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.arrays import header_of, to_arrow
 from unconstrain.recordings.formats.base import ColumnKey, Declared
-from unconstrain.recordings.formats.npz import header_of, to_arrow
 from unconstrain.recordings.table import Header, row
 from unconstrain.storage import Kind, read
 from unconstrain.storage.archive import NOTE, damaged

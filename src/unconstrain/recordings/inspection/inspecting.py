@@ -31,6 +31,7 @@ from unconstrain.recordings.inspection.proposal import (
     choose_time,
     key_of,
     keys_of,
+    rises_evenly,
 )
 from unconstrain.recordings.inspection.result import Inspection
 from unconstrain.recordings.inspection.timing import Timing, explained_by, judge_stamps
@@ -156,7 +157,10 @@ def _topics(file: Format) -> list[_Topic]:
 
 def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic]) -> Inspection:
     """Look into each table of a file, and take the first that holds a movement."""
-    listed = [f"topic {topic}" for topic in topics]
+    listed = []
+    if len(topics) > 1:
+        which = ", ".join(map(str, topics[:MOST_TOPICS]))
+        listed = [f"the topics that may hold a movement are {which}; --topic chooses others"]
     best: Inspection | None = None
     for topic in topics[:MOST_TOPICS]:
         if topic.count == 0:
@@ -197,10 +201,16 @@ def _inspect(
     header = first[0].columns()
     names = [column.name for column in header.columns]
     alike = [f for f in found if [column.name for column in f[1][0].columns().columns] == names]
-    files = [file for _, formats, _ in alike for file in formats if file.at_once or any(file.row_groups)]
+    numbered = [
+        (number, file)
+        for number, (_, formats, _) in enumerate(alike)
+        for file in formats
+        if file.at_once or any(file.row_groups)
+    ]
+    files = [file for _, file in numbered]
     if not files:
         raise DataError(f"{shown} has no samples")
-    looked = look_at(files)
+    looked = look_at(files, [number for number, _ in numbered])
     notes = list(looked.notes)
     if len(alike) < len(found):
         others = next(f[0] for f in found if f not in alike)
@@ -215,10 +225,14 @@ def _inspect(
     ]
     declared = first[0].declared()
     knows = declared is not None and declared.columns.state is not None
-    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values)]
+    given = None if declared is None else declared.columns.episode
+    told = [i for i, column in enumerate(looked.columns) if given is not None and column.name == given]
+    named = told or choose_episodes(reports, looked.values, None)[0]
+    before = _codes(named[0] if named else None, looked)
+    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values, before)]
     clock = clocks[0] if clocks else None
     rising = None if clock is None or len(alike) > 1 else clock.seconds
-    episodes, is_guess = choose_episodes(reports, looked.values, rising)
+    episodes, is_guess = (told, False) if told else choose_episodes(reports, looked.values, rising)
     codes = _codes(episodes[0] if episodes else None, looked)
     timing = None if clock is None else judge_stamps(clock.seconds, codes)
     if clock is not None and timing is not None:
@@ -229,6 +243,7 @@ def _inspect(
         notes.append(
             f"episodes are told apart by {name}, which changes where the time starts anew; else give --episode"
         )
+    reports = _without_held(reports, looked, codes)
     notes += _oddities(reports, looked, codes)
     judged = _Judged(looked, reports, clocks, episodes, codes, topic)
     tried = _try(paths, judged, robot, knows, len(alike) == len(found))
@@ -285,7 +300,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
     """Try proposals one after the other until one can be read."""
     if not alike:
         return _Tried(None, [], judged.reports)
-    if robot is not None:
+    if robot is not None and STATE in robot.features:
         proposals = _for_robot(judged)
     elif knows:
         proposals = iter([_Proposal(Columns(), Preparation())])
@@ -352,11 +367,21 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
     looked, reports = judged.looked, judged.reports
     clocks: list[_Clock | None] = [*judged.clocks[:2], None]
     episode = judged.episodes[0] if judged.episodes else None
+    counting = {
+        i
+        for i, report in enumerate(reports)
+        if report.kind in ("number", "position") and rises_evenly(looked.values[i], judged.codes)
+    }
     for clock in clocks:
-        taken = {i for i in (clock.place if clock else None, episode) if i is not None}
+        taken = {i for i in (clock.place if clock else None, episode) if i is not None} | counting
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
+            clockwork = _several(
+                [_name(looked.names[i], i) for i in sorted(counting - {clock and clock.place})]
+            )
+            if clockwork:
+                notes = (*notes, f"{clockwork}: rises evenly, as a clock does, and is left out of the state")
             refused: list[str] = []
             for actions in choose_actions(group, reports, looked.columns):
                 share, guessed = _agreement(group, actions, clock, judged)
@@ -492,6 +517,21 @@ def _time_notes(name: str, clock: _Clock, timing: Timing, reports: Sequence[Colu
     return notes
 
 
+def _without_held(reports: list[ColumnReport], looked: Looked, codes: Codes) -> list[ColumnReport]:
+    """Take columns that do not change within episodes for constant: a goal moves only from one to the next."""
+    within = np.diff(codes) == 0
+    if np.all(within) or not np.any(within):
+        return reports
+    return [
+        replace(report, kind="constant", detail="in each episode")
+        if report.kind not in ("time", "episode", "text", "empty", "constant", "index", "quaternion")
+        and (values := looked.values[i]) is not None
+        and not np.any(np.diff(values)[within])
+        else report
+        for i, report in enumerate(reports)
+    ]
+
+
 def _oddities(reports: Sequence[ColumnReport], looked: Looked, codes: Codes) -> list[str]:
     """Say what is odd about the columns."""
     notes = []
@@ -554,11 +594,12 @@ def _codes(place: int | None, looked: Looked) -> Codes:
     """Return the episode of each row, as a number: by file and, if there is one, by a column."""
     if place is None:
         return np.unique(looked.files, return_inverse=True)[1].astype(np.int64)
+    # Their values mean the same in all files of a recording.
     own: Any = looked.values[place]
     if own is None:
         own = looked.texts[place]
     inner = np.unique(own, return_inverse=True)[1]
-    codes = looked.files * (int(inner.max()) + 1) + inner if len(inner) else inner
+    codes = looked.recordings * (int(inner.max()) + 1) + inner if len(inner) else inner
     return np.unique(codes, return_inverse=True)[1].astype(np.int64)
 
 

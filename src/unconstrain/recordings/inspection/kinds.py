@@ -33,6 +33,8 @@ ANGLE = {
 POSITION = {"x", "y", "z", "tx", "ty", "tz", "px", "py", "pz", "pos", "position", "positions", "xyz"}
 STATE = {"state", "states"}
 ROTATION = {"quat", "quaternion", "orientation", "rotation"}
+ACTIONS = {"action", "actions", "acs", "u", "cmd", "command", "control", "ctrl"}
+NEXT = {"next"}
 NEITHER = {
     "covariance",
     "error",
@@ -145,7 +147,23 @@ def judge(
             values = columns[i]
             assert values is not None
             found[i] = replace(found[i], kind="quaternion", unit=None, detail=f"order {order}")
+        for i in _after(start + 4, names):
+            # A pose ends with its quaternion; what follows in the same array is a wrench, or anything else.
+            if found[i].kind == "position":
+                found[i] = replace(found[i], kind="number", unit=None)
     return found
+
+
+def _after(start: int, names: Sequence[str]) -> list[int]:
+    """Return the components that follow a quaternion in the array that it is part of."""
+    array = words(names[start - 1])[:-1]
+    after = []
+    for i in range(start, len(names)):
+        own = words(names[i])
+        if not own or not own[-1].isdecimal() or own[:-1] != array:
+            break
+        after.append(i)
+    return after
 
 
 def quaternions(names: Sequence[str], columns: Sequence[Array | None]) -> list[tuple[int, str]]:
@@ -232,10 +250,13 @@ def tells_episodes(name: str, texts: NDArray[np.str_]) -> bool:
 
 
 def _may_be_one(called: Sequence[Sequence[str]], letters: str) -> bool:
-    """Whether the names of four columns allow that they are a quaternion; `x, y, vx, vy` do not."""
+    """Whether the names of four columns allow that they are a quaternion; `x, y, vx, vy` do not, nor do actions."""
+    if any(ACTIONS & set(own) for own in called):
+        return False
     alike = all(own[:-1] == called[0][:-1] for own in called)
     numbered = alike and all(own[-1].isdecimal() or not own[-1] for own in called)
-    return sorted(letters) == sorted("wxyz") or numbered or all(ROTATION & set(own) for own in called)
+    lettered = alike and sorted(letters) == sorted("wxyz")
+    return lettered or numbered or all(ROTATION & set(own) for own in called)
 
 
 def _is_unit(four: Array) -> bool:

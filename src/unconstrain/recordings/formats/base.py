@@ -230,22 +230,6 @@ def find_part(name: str | None, every: Sequence[str], shown: str) -> str | None:
 
 
 @runtime_checkable
-class HasParts(Protocol):
-    """What a format does too whose files may hold several tables side by side, of which one is read."""
-
-    part: str | None
-    """The one that the user names."""
-
-    def parts(self) -> tuple[str, ...]:
-        """Return what there is to choose from: sheets, sections of an export, files of an archive."""
-        ...
-
-    def for_part(self, name: str) -> Format:
-        """Return the same file, of which nothing but this part is read. That it is not there, `columns` says."""
-        ...
-
-
-@runtime_checkable
 class HasTopics(Protocol):
     """What a format does too whose files hold several tables, of which the user names some: topics of a bag."""
 

@@ -12,6 +12,7 @@ from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
+from unconstrain.recordings.formats.json_lines import JsonLines
 from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.text_encoding import begin_text, read_text
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
@@ -48,7 +49,7 @@ class JsonDocument(Nested):
         except DataError:
             return False
         text = text.removeprefix(b"\xef\xbb\xbf").strip()
-        if text[:1] not in (b"{", b"["):
+        if text[:1] not in (b"{", b"[") or file.suffix in JsonLines.suffixes:
             return False
         lines = [line for line in text.split(b"\n") if line.strip()]
         if not is_all and len(lines) < 2:

@@ -20,6 +20,9 @@ from unconstrain.recordings.table import Column, Header, is_list, row
 DECODED = 131_072
 """Rows decoded at a time: as many as cost little memory, since every start on a column costs time."""
 
+UNIT = b"unit"
+"""Where, in the metadata of a field, a format says what its unit is."""
+
 BUFFERED = 1 << 20
 """Bytes read at a time of each column of a local file."""
 
@@ -78,7 +81,7 @@ class Parquet:
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
             batches = opened.iter_batches(DECODED, row_groups=groups, columns=names, use_threads=self.threads)
             while (rows := next(batches, None)) is not None:
-                rows = flatten(rows)
+                rows = _flat(rows)
                 if order is None:
                     order = self._order(rows.schema, columns)
                 length, first = len(rows), at
@@ -135,7 +138,7 @@ class Parquet:
         if not sum(self.row_groups):
             raise DataError(f"{self.file.shown} has no samples")
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
-            first = flatten(next(opened.iter_batches(1)))
+            first = _flat(next(opened.iter_batches(1)))
             return describe_columns(first, self.file.shown, sum(self.row_groups))
 
     def _open(self) -> Any:
@@ -151,11 +154,18 @@ class Parquet:
         return pq.ParquetFile(self.file.path, buffer_size=BUFFERED, page_checksum_verification=True)
 
 
-def flatten(rows: Any) -> Any:
-    """Return a table or a batch without records: their components are called `name.component`."""
-    while any(pa.types.is_struct(field.type) for field in rows.schema):
-        rows = rows.flatten()
-    return rows
+def flatten(table: Any) -> Any:
+    """Return a table without records: their components are called `name.component`."""
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
+    return table
+
+
+def _flat(rows: Any) -> Any:
+    """Return a batch without records."""
+    if not any(pa.types.is_struct(field.type) for field in rows.schema):
+        return rows
+    return flatten(pa.Table.from_batches([rows])).combine_chunks().to_batches()[0]
 
 
 def describe_columns(first: Any, shown: str, length: int) -> Header:
@@ -178,11 +188,12 @@ def describe_columns(first: Any, shown: str, length: int) -> Header:
     lists: dict[str, tuple[pa.DataType, int | None]] = {}
     unusable: dict[str, str] = {}
     seen: dict[str, int] = {}
-    for name, values in zip(first.schema.names, first.columns, strict=True):
+    for field, values in zip(first.schema, first.columns, strict=True):
+        name, unit = field.name, (field.metadata or {}).get(UNIT, b"").decode(errors="replace")
         nth = seen[name] = seen.get(name, -1) + 1
         kind = values.type
         if not pa.types.is_nested(kind):
-            columns.append(Column(name, kind, length, nth))
+            columns.append(Column(name, kind, length, nth, unit=unit))
             if pa.types.is_null(kind):
                 lists[name] = kind, length
             continue

@@ -8,9 +8,10 @@ import pyarrow as pa
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.formats.base import ColumnKey, WholeFile, note_guesses
-from unconstrain.recordings.formats.parquet import describe_columns, flatten
+from unconstrain.recordings.formats.parquet import UNIT, describe_columns, flatten
 from unconstrain.recordings.formats.seconds import with_time
 from unconstrain.recordings.table import Header
+from unconstrain.recordings.units import said_of_units, unit_in
 
 
 class Tabular(WholeFile):
@@ -43,6 +44,7 @@ class Tabular(WholeFile):
         """Read rows of these columns as one piece, with its first row."""
         table, notes = self._loaded
         arrays = []
+        units: dict[str, str] = {}
         for name, nth in columns:
             where = [i for i, other in enumerate(table.column_names) if other == name]
             if nth >= len(where):
@@ -51,7 +53,9 @@ class Tabular(WholeFile):
                 )
             column = table.column(where[nth]).slice(start, None if stop is None else stop - start)
             arrays.append(_as_one(column))
+            units[name] = (table.schema.field(where[nth]).metadata or {}).get(UNIT, b"").decode()
         named = [name for name, _ in columns]
+        notes = (*notes, *said_of_units({name: unit or unit_in(name) for name, unit in units.items()}))
         yield start, pa.RecordBatch.from_arrays(arrays, names=named, metadata=note_guesses(notes))
 
     @cached_property

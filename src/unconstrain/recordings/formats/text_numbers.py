@@ -30,8 +30,11 @@ MISSING = frozenset(
 )  # fmt: skip
 """What stands for a number that is missing, in small letters."""
 
-SENTINELS = (-999.0, -9999.0, -99999.0, -999999.0, 9999.0, 99999.0, 999999.0)
+SENTINELS = (-999.0, -9999.0, -99999.0, -999999.0)
 """Numbers that stand for a missing one where they lie far from all others."""
+
+FEWEST = 10
+"""Numbers, at least, from which a sentinel is told."""
 
 FAR = 5.0
 """A sentinel is as many times as far from the others as these are apart."""
@@ -112,6 +115,8 @@ def _without_sentinels(
     column: pa.Array, numbers: pa.Array, called: str, guesses: dict[str, None]
 ) -> pa.Array:
     """Return a column without a number such as -9999 that lies far from all others."""
+    if len(numbers) < FEWEST:
+        return column
     for sentinel in SENTINELS:
         held = pc.equal(numbers, sentinel)
         count = pc.sum(held).as_py() or 0

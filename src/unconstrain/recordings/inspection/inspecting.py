@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,15 +12,18 @@ from numpy.typing import NDArray
 
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
-from unconstrain.recordings.formats.base import Format
+from unconstrain.recordings.formats.base import Format, HasParts
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
 from unconstrain.recordings.inspection.command import fit_command
+from unconstrain.recordings.inspection.kinds import TIME as TIME_WORDS
 from unconstrain.recordings.inspection.kinds import (
     ColumnReport,
     epoch_unit,
     judge,
     sign_flips,
     tells_episodes,
+    with_unit,
+    words,
     wraps,
 )
 from unconstrain.recordings.inspection.looking import Looked, look_at
@@ -51,6 +55,9 @@ MOST_TRIED = 12
 TRIED_ROWS = 3_000_000
 """Rows of files that are read to try a proposal; of more, it is proposed without."""
 
+SPARSE = 0.5
+"""Where fewer of the rows hold all columns, these are filled at different rates."""
+
 NANOSECOND_STEP = 1e5
 """Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
 
@@ -61,13 +68,18 @@ MOST_TOPICS = 30
 """Tables of one file that are looked into."""
 
 
-def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> Inspection:
+def inspect(
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
+) -> Inspection:
     """Look at recordings, and find the command that learns from them.
 
     Parameters
     ----------
     source : path, pattern, URI, or several of them
         Files of any format that `open` reads.
+    part : str, optional
+        Which part of each file, such as a sheet; see `Columns`. By default the one that `open` reads, or else the first
+        that holds a movement.
 
     Returns
     -------
@@ -85,21 +97,29 @@ def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -
     >>> print(uc.inspect("wipe.csv"))  # doctest: +SKIP
     """
     paths = _paths(source)
-    found = open_formats(paths, Columns())
+    chosen = Columns(part=part)
+    found = open_formats(paths, chosen)
     shown, files, robot = found[0]
     topics = _topics(files[0])
     with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
         if topics:
             return _inspect_topics(paths, shown, files[0], topics)
-        return _inspect(paths, found, robot, None)
+        inspected = _inspect(paths, found, robot, chosen)
+        if inspected.next is None and part is None and len(found) == 1 and isinstance(files[0], HasParts):
+            return _inspect_parts(paths, files[0], inspected)
+        return inspected
 
 
-def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[str]:
+def list_keys(
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
+) -> list[str]:
     """List the columns that there are, or, of a file that holds several tables, these.
 
     Parameters
     ----------
     source : path, pattern, URI, or several of them
+    part : str, optional
+        Which part of each file.
 
     Returns
     -------
@@ -112,7 +132,7 @@ def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
         There is no such file, or it cannot be read.
     """
     paths = _paths(source)
-    file = open_formats(paths, Columns())[0].formats[0]
+    file = open_formats(paths, Columns(part=part))[0].formats[0]
     topics = _topics(file)
     if topics:
         return [str(topic) for topic in topics]
@@ -167,7 +187,7 @@ def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic
             continue
         name = topic.name
         try:
-            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, name)
+            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, Columns(topic=name))
         except UnconstrainError as error:
             listed.append(f"topic {name} was not looked into: {error}")
             continue
@@ -179,6 +199,20 @@ def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic
     if best is None:
         return Inspection(shown, 0, 0, None, None, (), (*listed, "no topic holds a movement"), None)
     return replace(best, notes=(*listed, *best.notes))
+
+
+def _inspect_parts(paths: list[Any], file: HasParts, first: Inspection) -> Inspection:
+    """Look into the parts of a file, and take the first that holds a movement, or else the part that is read."""
+    for name in file.parts()[:MOST_TOPICS]:
+        chosen = Columns(part=name)
+        try:
+            one = _inspect(paths, open_formats(paths, chosen), None, chosen)
+        except UnconstrainError:
+            continue
+        if one.next is not None:
+            other = f"part {name!r} holds a movement; --part chooses another one, of {', '.join(map(repr, file.parts()))}"
+            return replace(one, notes=(other, *one.notes))
+    return first
 
 
 @dataclass(frozen=True)
@@ -195,7 +229,7 @@ def _inspect(
     paths: list[Any],
     found: Sequence[Found],
     robot: LeRobot | None,
-    topic: str | None,
+    chosen: Columns,
 ) -> Inspection:
     shown, first, _ = found[0]
     header = first[0].columns()
@@ -217,6 +251,11 @@ def _inspect(
         notes.append(f"{others} has other columns than {shown}, so that one `fit` cannot read both")
     called = [_called(column.name, column.part_of, column.component, robot) for column in looked.columns]
     reports = judge(called, looked.values, looked.units)
+    reports = [
+        with_unit(report, column.unit, values)
+        for report, column, values in zip(reports, looked.columns, looked.values, strict=True)
+    ]
+    notes += _unread_times(reports, looked)
     reports = [
         replace(report, kind="episode")
         if i in looked.texts and tells_episodes(report.name, looked.texts[i])
@@ -245,9 +284,10 @@ def _inspect(
         )
     reports = _without_held(reports, looked, codes)
     notes += _oddities(reports, looked, codes)
-    judged = _Judged(looked, reports, clocks, episodes, codes, topic)
+    judged = _Judged(looked, reports, clocks, episodes, codes, chosen)
     tried = _try(paths, judged, robot, knows, len(alike) == len(found))
     notes += tried.notes
+    timing = _of_the_states(timing, clock, codes, looked, tried.states)
     reports = [replace(report, name=name) for report, name in zip(tried.reports, looked.names, strict=True)]
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
     rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
@@ -270,7 +310,8 @@ class _Judged:
     clocks: list[_Clock]
     episodes: list[int]
     codes: Codes
-    topic: str | None
+    chosen: Columns
+    """The topic or the part that is looked into."""
 
 
 @dataclass(frozen=True)
@@ -278,6 +319,7 @@ class _Tried:
     next: str | None
     notes: list[str]
     reports: list[ColumnReport]
+    states: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -303,7 +345,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
     if robot is not None and STATE in robot.features:
         proposals = _for_robot(judged)
     elif knows:
-        proposals = iter([_Proposal(Columns(), Preparation())])
+        proposals = iter([_Proposal(judged.chosen, Preparation())])
     else:
         proposals = _proposals(judged)
     problem = ""
@@ -326,7 +368,8 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
             replace(report, kind=_kind_in(proposal, i, report.kind))
             for i, report in enumerate(judged.reports)
         ]
-        return _Tried(fit_command(paths, proposal.columns, proposal.preparation), notes, reports)
+        command = fit_command(paths, proposal.columns, proposal.preparation)
+        return _Tried(command, notes, reports, proposal.positions)
     return _Tried(None, [*judged.looked.guesses, _why_none(judged, problem)], judged.reports)
 
 
@@ -406,14 +449,13 @@ def _roles(
 ) -> Iterator[_Proposal]:
     looked = judged.looked
     at = looked.positions
-    columns = Columns(
+    columns = replace(
+        judged.chosen,
         state=keys_of(group.places, looked.columns, at),
         action=None if actions is None else keys_of(actions.places, looked.columns, at),
         time=None if clock is None else key_of(clock.place, looked.columns, at),
         episode=key_of(judged.episodes[0], looked.columns, at) if judged.episodes else None,
     )
-    if judged.topic is not None:
-        columns = replace(columns, topic=judged.topic)
     unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
     plain = Preparation(time_unit=unit, rate=1.0 if clock is None and actions is None else None)
     velocities = () if actions is None else actions.places
@@ -425,9 +467,51 @@ def _roles(
                 f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
             )
             yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
+    resampled = _rate_of_each(group.places, clock, judged)
+    if resampled is not None:
+        text = (
+            f"the states are filled at different times, so each is interpolated between its own stamps, to {resampled:g} "
+            "Hz; --resample names another rate"
+        )
+        yield _Proposal(columns, replace(plain, resample=resampled), (*notes, text), velocities, group.places)
     # Samples are left out only if the recording cannot be used with them.
     dropping = replace(plain, drop="missing,duplicates,short")
     yield _Proposal(columns, dropping, notes, velocities, group.places)
+
+
+def _rate_of_each(places: Sequence[int], clock: _Clock | None, judged: _Judged) -> float | None:
+    """Return the rate (Hz) of the column that is filled most often, where few rows hold all columns."""
+    if clock is None:
+        return None
+    there = np.isfinite(_matrix(judged.looked.values, places))
+    counts = there.sum(axis=0)
+    best = there[:, int(np.argmax(counts))]
+    if there.all(axis=1).sum() > SPARSE * best.sum():
+        return None
+    rate = judge_stamps(clock.seconds[best], judged.codes[best]).rate_hz
+    return None if rate is None else float(f"{rate:.3g}")
+
+
+def _of_the_states(
+    timing: Timing | None, clock: _Clock | None, codes: Codes, looked: Looked, states: Sequence[int]
+) -> Timing | None:
+    """Return what the stamps say of the rows that hold states, where most rows hold others."""
+    if timing is None or clock is None or not states:
+        return timing
+    there = np.isfinite(_matrix(looked.values, states)).any(axis=1)
+    return timing if there.mean() > SPARSE else judge_stamps(clock.seconds[there], codes[there])
+
+
+def _unread_times(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
+    """Say which columns are called after time and hold text of which no time can be made."""
+    return [
+        f"{_name(report.name, i)} holds text such as {str(looked.texts[i][0])!r}, of which no time can be made: write it as "
+        "2024-12-31 23:59:59.5, or in seconds"
+        for i, report in enumerate(reports)
+        if i in looked.texts
+        and TIME_WORDS & set(words(report.name))
+        and re.search(r"\d[:./-]\d", "".join(looked.texts[i][:1]))
+    ]
 
 
 def _shortest_window(clock: _Clock, codes: Codes) -> float | None:

@@ -31,6 +31,7 @@ ANGLE = {
     "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "rx", "ry", "rz", "q",
 }  # fmt: skip
 POSITION = {"x", "y", "z", "tx", "ty", "tz", "px", "py", "pz", "pos", "position", "positions", "xyz"}
+EARTH = {"latitude", "longitude", "lat", "lon", "lng"}
 STATE = {"state", "states"}
 ROTATION = {"quat", "quaternion", "orientation", "rotation"}
 ACTIONS = {"action", "actions", "acs", "u", "cmd", "command", "control", "ctrl"}
@@ -164,6 +165,33 @@ def _after(start: int, names: Sequence[str]) -> list[int]:
             break
         after.append(i)
     return after
+
+
+def with_unit(report: ColumnReport, unit: str, values: Array | None) -> ColumnReport:
+    """Return a report of a column whose unit the file tells, which may say of what kind it is.
+
+    Parameters
+    ----------
+    report : ColumnReport
+    unit : str
+        As the file has it; "" where it says nothing.
+    values : ndarray of shape (N,) or None
+
+    Returns
+    -------
+    ColumnReport
+    """
+    if not unit or values is None or report.kind in ("text", "empty", "quaternion", "episode", "flag"):
+        return report
+    kind = next((kind for kind, own in FITTING.items() if unit in own), None)
+    if kind == "time":
+        here = values[np.isfinite(values)]
+        rises = len(here) > 1 and float(np.mean(np.diff(here) > 0)) > SELDOM
+        return replace(report, kind="time", unit=unit) if rises or report.kind == "time" else report
+    if EARTH & set(words(report.name)):
+        return replace(report, kind="position", unit=unit)
+    unknown = report.kind in ("number", "position", "angle") and kind is not None
+    return replace(report, kind=kind if unknown and kind is not None else report.kind, unit=unit)
 
 
 def quaternions(names: Sequence[str], columns: Sequence[Array | None]) -> list[tuple[int, str]]:

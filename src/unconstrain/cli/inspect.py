@@ -19,7 +19,8 @@ from unconstrain.progress import working
     help="Print one JSON object: rows, episodes, rate_hz, duration_s, columns, notes, next.",
 )
 @click.option(
-    "--part", help="Which part of a file: a sheet, a section of an export, a file of an archive, a set of demonstrations."
+    "--part",
+    help="Which part of a file: a sheet, a section of an export, a file of an archive, a set of demonstrations.",
 )
 @click.option("--keys", is_flag=True, help="Only list the columns, or the topics where a file has these.")
 def inspect(files: tuple[str, ...], as_json: bool, part: str | None, keys: bool) -> None:

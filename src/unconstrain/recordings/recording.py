@@ -44,6 +44,7 @@ class Episodes(NamedTuple):
     values: list[Any]
     labels: list[str]
 
+
 NEEDED = ("state", "relative_to", "action", "time")
 """What a row must hold to be used."""
 

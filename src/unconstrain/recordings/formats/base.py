@@ -193,7 +193,9 @@ def note_part(taken: str, every: Sequence[str]) -> str:
     """
     others = [repr(name) for name in every if name != taken]
     more = f" and {len(others) - MOST_PARTS} more" if len(others) > MOST_PARTS else ""
-    return f"of its parts {taken!r} is read; part= names another one, of {', '.join(others[:MOST_PARTS])}{more}"
+    return (
+        f"of its parts {taken!r} is read; part= names another one, of {', '.join(others[:MOST_PARTS])}{more}"
+    )
 
 
 def find_part(name: str | None, every: Sequence[str], shown: str) -> str | None:

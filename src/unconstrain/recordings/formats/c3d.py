@@ -78,8 +78,7 @@ class C3D(Tabular):
         table = pa.table(columns)
         units = ["s", *[unit] * (len(columns) - 1)]
         fields = [
-            field.with_metadata({UNIT: own.encode()})
-            for field, own in zip(table.schema, units, strict=True)
+            field.with_metadata({UNIT: own.encode()}) for field, own in zip(table.schema, units, strict=True)
         ]
         return table.cast(pa.schema(fields)), tuple(notes)
 

@@ -149,7 +149,9 @@ def _columns(records: Sequence[dict[str, Any]], depth: int) -> Node:
         values = [record.get(name) for record in records]
         there = [value for value in values if value is not None]
         if there and all(isinstance(value, dict) for value in there):
-            columns[name] = _columns([value or {} for value in values], depth + 1) if depth < DEEPEST else Odd("")
+            columns[name] = (
+                _columns([value or {} for value in values], depth + 1) if depth < DEEPEST else Odd("")
+            )
         elif there and all(isinstance(value, list) for value in there) and len(there) < len(values):
             lacking = [None] * len(there[0])
             columns[name] = _leaf([lacking if value is None else value for value in values], (len(values),))

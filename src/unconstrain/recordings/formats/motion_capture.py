@@ -126,7 +126,12 @@ def find_motive(lines: Sequence[str]) -> Layout | None:
         own = letter.get(kind, "") + axis if axis else kind
         names.append(_join(name, own) if name and name != "Name" else axis)
     lengths, angle = plain_unit(said.get("Length Units", "")), "" if letter["Rotation"] == "Q" else "deg"
-    of_kind = {"Position": lengths, "Rotation": angle, "Mean Marker Error": lengths, "Error Per Marker": lengths}
+    of_kind = {
+        "Position": lengths,
+        "Rotation": angle,
+        "Mean Marker Error": lengths,
+        "Error Per Marker": lengths,
+    }
     units = ["", *(of_kind.get(kind, "") for kind in kinds[1:])]
     notes = []
     if angle:
@@ -137,9 +142,7 @@ def find_motive(lines: Sequence[str]) -> Layout | None:
         names, columns = [*names, "time"], (*columns, FrameTime(0, None, float(rate)))
         units.append("s")
         notes.append(f"time is made of the frame numbers and the rate of the header, {float(rate):g} Hz")
-    return Layout(
-        ",", width, tuple(names), columns, at + 1, tuple(notes), tuple(units), is_padded=True
-    )
+    return Layout(",", width, tuple(names), columns, at + 1, tuple(notes), tuple(units), is_padded=True)
 
 
 def _heads(lines: Sequence[str]) -> list[int]:

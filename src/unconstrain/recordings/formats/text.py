@@ -36,8 +36,8 @@ class Text(WholeFile):
 
     All columns are text; they become numbers only where they are used, so other columns may hold anything. Found by
     itself: the encoding, title lines, the delimiter (tab, semicolon, bar, comma, or spaces), a decimal comma where that
-    is not the delimiter, a header of one line or several, a line of units, a byte-order mark. Left out: empty lines, and
-    lines that start with `#`, `%` or `//`; the last of these before the data is the header if it names every column, as
+    is not the delimiter, a header of one line or several, a line of units, a byte-order mark. Left out: empty lines
+    and lines that start with `#`, `%` or `//`; the last of these before the data is the header if it names every column, as
     NumPy's `savetxt` writes. Where the header comes again, another episode begins.
 
     Parameters
@@ -169,7 +169,5 @@ class Text(WholeFile):
         if begins_anew(data if is_all else self._read()[0], layout):
             name = next(name for name in EPISODE if name not in layout.names)
             units = (*layout.units, "") if layout.units else ()
-            layout = replace(
-                layout, names=(*layout.names, name), cells=(*layout.cells, Part()), units=units
-            )
+            layout = replace(layout, names=(*layout.names, name), cells=(*layout.cells, Part()), units=units)
         return layout

@@ -34,7 +34,20 @@ CONTROL = re.compile("[\x00-\x08\x0e-\x1a\x1c-\x1f\x7f\ufffe]")
 PRINTED = re.compile(b"[\x80-\x9f]")
 """Bytes that are letters and dashes on Windows, and nothing in Latin-1."""
 
-NO_LETTERS = (".parquet", ".pq", ".mat", ".h5", ".hdf5", ".xlsx", ".npz", ".npy", ".bag", ".mcap", ".db3", ".c3d")
+NO_LETTERS = (
+    ".parquet",
+    ".pq",
+    ".mat",
+    ".h5",
+    ".hdf5",
+    ".xlsx",
+    ".npz",
+    ".npy",
+    ".bag",
+    ".mcap",
+    ".db3",
+    ".c3d",
+)
 """Files of an archive that have to be taken out of it to be read."""
 
 LATIN = "it is not UTF-8, so it is read as {}; save it as UTF-8 if letters look wrong"

@@ -31,9 +31,7 @@ def is_header(rows: Sequence[Sequence[str]]) -> bool:
     # A word above numbers is a name, and so are the years beside it.
     words = [i for i, cell in enumerate(first) if cell and not is_number(cell)]
     below = [row for row in rows[1:] if len(row) == len(first)]
-    return (
-        _are_years(numeric) and any(all(is_number(row[i]) for row in below) for i in words) and bool(below)
-    )
+    return _are_years(numeric) and any(all(is_number(row[i]) for row in below) for i in words) and bool(below)
 
 
 def is_numbered_header(rows: Sequence[Sequence[str]]) -> bool:
@@ -69,7 +67,9 @@ def are_units(row: Sequence[str], following: Sequence[str]) -> bool:
     """Whether a line holds the units of the columns."""
     cells = [cell.strip() for cell in row]
     filled = [cell for cell in cells if cell]
-    known = all(UNIT.fullmatch(cell.strip("[]()<>{} ")) for cell in filled) or all(map(BRACKETED.fullmatch, filled))
+    known = all(UNIT.fullmatch(cell.strip("[]()<>{} ")) for cell in filled) or all(
+        map(BRACKETED.fullmatch, filled)
+    )
     # Letters above letters may be the names of episodes.
     return (
         bool(filled)
@@ -81,8 +81,9 @@ def are_units(row: Sequence[str], following: Sequence[str]) -> bool:
 def join_names(rows: Sequence[Sequence[str]], *, is_index: bool) -> list[str]:
     """Join names that stand in several lines, as a body stands above its axes.
 
-    A name holds for the empty cells after it, too. What is the same in all columns is left out, and a line that names
-    nothing but the first column is its name; so is the last one above a column that counts the rows.
+    A name holds for the empty cells after it, too. Of three lines or more, one that is the same in all columns is left
+    out, and a line that names nothing but the first column is its name; so is the last one above a column that counts
+    the rows.
     """
     lines = [[cell.strip() for cell in row] for row in rows]
     first = next((row[0] for row in reversed(lines) if row[0]), "")
@@ -90,10 +91,8 @@ def join_names(rows: Sequence[Sequence[str]], *, is_index: bool) -> list[str]:
     parts: list[list[str]] = []
     for number, row in enumerate(lines):
         filled = row if number == len(lines) - 1 else _carried(row)
-        if len(lines) == 1 or len(set(filled[1:])) > 1 or len(filled) < 3:
+        if len(lines) < 3 or len(set(filled[1:])) > 1 or len(filled) < 3:
             parts.append(filled)
-    if not parts:
-        parts = [lines[-1]]
     joined = [".".join(filter(None, (part[i] for part in parts))) for i in range(len(rows[0]))]
     return [first if is_index or not joined[0] else joined[0], *joined[1:]]
 

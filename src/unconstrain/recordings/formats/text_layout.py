@@ -137,10 +137,16 @@ def _name(
         return [], []
     at = next((i for i in range(1, len(header)) if are_units(header[i], body[0])), None)
     named = [row for i, row in enumerate(header) if i != at]
-    names = [name.strip() for name in named[0]] if len(named) == 1 else join_names(named, is_index=is_counted(body))
+    names = (
+        [name.strip() for name in named[0]]
+        if len(named) == 1
+        else join_names(named, is_index=is_counted(body))
+    )
     if len(named) > 1:
         shown = ", ".join([name for name in names if name][:3])
-        notes.append(f"lines {numbers[0]} to {numbers[len(header) - 1]} are taken for names in several lines: {shown}")
+        notes.append(
+            f"lines {numbers[0]} to {numbers[len(header) - 1]} are taken for names in several lines: {shown}"
+        )
     if at is None:
         return names, []
     units = [plain_unit(cell) for cell in header[at]]
@@ -156,7 +162,12 @@ def _names_bodies(rows: list[list[str]]) -> bool:
         return False
     above, names = ([cell.strip() for cell in row] for row in rows[:2])
     filled = [cell for cell in above if cell]
-    if not filled or any(map(is_value, filled)) or (len(filled) == 1 and above[0]) or any(map(is_number, names)):
+    if (
+        not filled
+        or any(map(is_value, filled))
+        or (len(filled) == 1 and above[0])
+        or any(map(is_number, names))
+    ):
         return False
     lacking = any(cell and not name for cell, name in zip(above, names, strict=True))
     own = [name for name in names if name]

@@ -9,9 +9,7 @@ from itertools import islice
 from unconstrain.recordings.formats.text_encoding import BOM
 from unconstrain.recordings.formats.text_made import Made
 
-NUMBER = re.compile(
-    r"\s*([+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity))\s*", re.IGNORECASE
-)
+NUMBER = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity))\s*", re.IGNORECASE)
 FLAG = re.compile(r"true|false", re.IGNORECASE)
 COMMENTS = (b"#", b"%", b"//")
 MARKS = "\t;|,"

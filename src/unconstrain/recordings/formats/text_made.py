@@ -91,7 +91,9 @@ class JoinedTime:
     def make(self, columns: Sequence[Cells], n_rows: int, begins: Sequence[int]) -> pa.Array:
         """Return the column, (N,)."""
         seconds, rest = (cells.numbers().astype(np.int64) for cells in columns)
-        return pa.array(seconds * BILLION + rest * (BILLION // self.ticks), pa.int64()).cast(pa.duration("ns"))
+        return pa.array(seconds * BILLION + rest * (BILLION // self.ticks), pa.int64()).cast(
+            pa.duration("ns")
+        )
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,9 @@ def _count_begins(n_rows: int, begins: Sequence[int]) -> NDArray[np.int64]:
     return np.cumsum(marks)
 
 
-def cells_of(made: Made, read: dict[int, Any], names: dict[int, str], shown: str, place: Callable) -> list[Cells]:
+def cells_of(
+    made: Made, read: dict[int, Any], names: dict[int, str], shown: str, place: Callable
+) -> list[Cells]:
     """Return the cells that a column is made of, as it asks for them.
 
     Parameters

@@ -19,7 +19,9 @@ HUNDREDS = r"^\s*[+-]?[1-9]\d{2}(\.\d*)?\s*$"
 PLAIN = r"^\s*[+-]?\d+(\.\d*)?\s*$"
 SPACED = r"^[+-]?\d{1,3}(['’\x{a0}\x{202f}\x{2009} ]\d{3})+([.,]\d*)?$"
 FORTRAN = r"^([+-]?\d*\.?\d*)[dD]([+-]?\d+)$"
-WITH_UNIT = r"^(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°%µμΩ][^\d,:;\[\]()]{0,7})$"
+WITH_UNIT = (
+    r"^(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°%µμΩ][^\d,:;\[\]()]{0,7})$"
+)
 
 MISSING = frozenset(
     {
@@ -84,8 +86,9 @@ def plain_text(
     if numbers is not None:
         guesses |= own
         return _without_sentinels(cleaned, numbers, called, guesses)
-    stamps, found = iso_times(_without_words(column, called, {}))
-    if found or stamps is not column:
+    worded = _without_words(column, called, {})
+    stamps, found = iso_times(worded)
+    if stamps is not worded:
         guesses |= {f"{called}: {guess}": None for guess in found}
         return stamps
     # What numbers there are beside text have their commas read alike.

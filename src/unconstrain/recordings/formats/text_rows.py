@@ -1,4 +1,4 @@
-"""Which lines of a text are samples: not those where a logger began anew or broke off, nor what stands below a table."""
+"""Which lines of a text are samples: not those where a logger began anew or broke off, nor what stands below."""
 
 import csv
 from dataclasses import dataclass
@@ -57,7 +57,9 @@ def find_rows(data: bytes, layout: Layout) -> Rows:
         entries = whole
         if left:
             lines = "line" if left == 1 else "lines"
-            notes.append(f"left out {left} {lines} with bytes that are zero, as a logger that crashed leaves them")
+            notes.append(
+                f"left out {left} {lines} with bytes that are zero, as a logger that crashed leaves them"
+            )
     entries, begins = _without_headings(data, entries, layout, notes)
     if len(entries) >= FEWEST and begins[-1:] != [len(entries)]:
         count = len(entries)
@@ -110,13 +112,11 @@ def _without_headings(
 
 
 def _is_title(line: bytes, layout: Layout) -> bool:
-    first = _cells(line, layout)[:1]
-    return not first or first[0].strip()[:1].isalpha() or first[0].startswith("*") or not first[0].strip()
+    cells = [cell.strip() for cell in _cells(line, layout)]
+    return not cells or cells[0][:1].isalpha() or cells[0].startswith("*") or not any(map(is_number, cells))
 
 
-def _leave_out_half(
-    data: bytes, entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]
-) -> None:
+def _leave_out_half(data: bytes, entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]) -> None:
     """Leave out a last line that was cut while it was written."""
     if data.rstrip(b"\0")[-1:] in (b"\n", b"\r"):
         return
@@ -151,8 +151,8 @@ def _leave_out_footer(entries: list[tuple[int, bytes]], layout: Layout, notes: l
             break
         kept -= 1
     if kept < len(entries):
-        first, last = entries[kept][0], entries[-1][0]
-        which = f"line {first} is" if first == last else f"lines {first} to {last} are"
+        top, bottom = entries[kept][0], entries[-1][0]
+        which = f"line {top} is" if top == bottom else f"lines {top} to {bottom} are"
         said = " ".join(entries[kept][1].decode(errors="replace").split())
         notes.append(f"{which} taken for a footer and left out: {said:.40}")
         del entries[kept:]
@@ -170,4 +170,3 @@ def _cells(line: bytes, layout: Layout) -> list[str]:
         return split_line(line.decode(errors="replace"), layout.delimiter)
     except csv.Error:
         return []
-

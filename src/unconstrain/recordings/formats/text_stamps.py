@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 from unconstrain.recordings.formats.text_made import JoinedTime, RowTime
 
@@ -115,4 +116,4 @@ def _increases(cells: Sequence[str]) -> bool:
         numbers = [float(cell.replace(",", ".")) for cell in cells]
     except ValueError:
         return False
-    return len(numbers) > 1 and all(b > a for a, b in zip(numbers, numbers[1:], strict=False))
+    return len(numbers) > 1 and all(b > a for a, b in pairwise(numbers))

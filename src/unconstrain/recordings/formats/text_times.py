@@ -13,7 +13,9 @@ CLOCK = (
     r"(?: ?(?P<half>[AaPp][Mm]))?"
 )
 YEAR_FIRST = rf"^(?P<year>\d{{4}})[-/.](?P<month>\d{{1,2}})[-/.](?P<day>\d{{1,2}})[ T]+{CLOCK}Z?$"
-YEAR_LAST = rf"^(?P<one>\d{{1,2}})(?P<mark>[-/.])(?P<two>\d{{1,2}})[-/.](?P<year>\d{{4}}|\d{{2}})[, T]+{CLOCK}$"
+YEAR_LAST = (
+    rf"^(?P<one>\d{{1,2}})(?P<mark>[-/.])(?P<two>\d{{1,2}})[-/.](?P<year>\d{{4}}|\d{{2}})[, T]+{CLOCK}$"
+)
 BY_NAME = rf"^(?P<day>\d{{1,2}})[- ](?P<name>[A-Za-z]{{3}})[a-z]*[- ](?P<year>\d{{4}})[, T]+{CLOCK}$"
 OF_DAY = rf"^(?:(?P<days>\d+) days? \+?)?{CLOCK}$"
 MINUTES = r"^(?P<minute>\d{1,2}):(?P<second>\d{1,2})\.(?P<fraction>\d{1,9})$"
@@ -103,8 +105,8 @@ def _year_last(parts: pa.Array) -> tuple[np.ndarray | None, tuple[str, ...]]:
         return None, ()
     example = f"{parts[0]['one']}{parts[0]['mark']}{parts[0]['two']}{parts[0]['mark']}{parts[0]['year']}"
     clock = _clock(parts)
-    is_unsure = by_day is not None and by_month is not None
-    if is_unsure:
+    is_unsure = False
+    if by_day is not None and by_month is not None:
         spans = np.ptp(by_day), np.ptp(by_month)
         points = parts[0]["mark"].as_py() == "."
         halves = pc.any(pc.not_equal(parts.field("half"), "")).as_py()
@@ -116,7 +118,9 @@ def _year_last(parts: pa.Array) -> tuple[np.ndarray | None, tuple[str, ...]]:
     guess = f"dates such as {example} are read with the {first} first"
     if is_unsure:
         guess += ", which no day above 12 tells; write them as 2024-12-31 if that is wrong"
-    return (by_day if day_first else by_month) + clock, (guess,)
+    date = by_day if day_first else by_month
+    assert date is not None
+    return date + clock, (guess,)
 
 
 def _by_name(parts: pa.Array) -> tuple[np.ndarray | None, tuple[str, ...]]:

@@ -210,7 +210,8 @@ def _inspect_parts(paths: list[Any], file: HasParts, first: Inspection) -> Inspe
         except UnconstrainError:
             continue
         if one.next is not None:
-            other = f"part {name!r} holds a movement; --part chooses another one, of {', '.join(map(repr, file.parts()))}"
+            every = ", ".join(map(repr, file.parts()))
+            other = f"part {name!r} holds a movement; --part chooses another one, of {every}"
             return replace(one, notes=(other, *one.notes))
     return first
 
@@ -470,8 +471,8 @@ def _roles(
     resampled = _rate_of_each(group.places, clock, judged)
     if resampled is not None:
         text = (
-            f"the states are filled at different times, so each is interpolated between its own stamps, to {resampled:g} "
-            "Hz; --resample names another rate"
+            f"the states are filled at different times, so each is interpolated between its own stamps, to "
+            f"{resampled:g} Hz; --resample names another rate"
         )
         yield _Proposal(columns, replace(plain, resample=resampled), (*notes, text), velocities, group.places)
     # Samples are left out only if the recording cannot be used with them.
@@ -505,8 +506,8 @@ def _of_the_states(
 def _unread_times(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
     """Say which columns are called after time and hold text of which no time can be made."""
     return [
-        f"{_name(report.name, i)} holds text such as {str(looked.texts[i][0])!r}, of which no time can be made: write it as "
-        "2024-12-31 23:59:59.5, or in seconds"
+        f"{_name(report.name, i)} holds text such as {str(looked.texts[i][0])!r}, of which no time can be made: write it "
+        "as 2024-12-31 23:59:59.5, or in seconds"
         for i, report in enumerate(reports)
         if i in looked.texts
         and TIME_WORDS & set(words(report.name))

@@ -197,8 +197,8 @@ def _strays(cells: Cells, numbers: Array) -> list[str]:
     first = int(places[0])
     more = f" and at {len(places) - 1} more" if len(places) > 1 else ""
     return [
-        f"{cells.called} holds {cells.values[first].as_py()!r} at {cells.place(first)}{more}, where numbers are needed: "
-        "correct it, or leave such rows out with --drop missing"
+        f"{cells.called} holds {cells.values[first].as_py()!r} at {cells.place(first)}{more}, where numbers are needed"
+        ": correct it, or leave such rows out with --drop missing"
     ]
 
 

@@ -37,8 +37,8 @@ class Text(WholeFile):
     All columns are text; they become numbers only where they are used, so other columns may hold anything. Found by
     itself: the encoding, title lines, the delimiter (tab, semicolon, bar, comma, or spaces), a decimal comma where that
     is not the delimiter, a header of one line or several, a line of units, a byte-order mark. Left out: empty lines
-    and lines that start with `#`, `%` or `//`; the last of these before the data is the header if it names every column, as
-    NumPy's `savetxt` writes. Where the header comes again, another episode begins.
+    and lines that start with `#`, `%` or `//`; the last of these before the data is the header if it names every
+    column, as NumPy's `savetxt` writes. Where the header comes again, another episode begins.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ def _ragged(rows: Rows, layout: Layout, shown: str, error: Exception) -> DataErr
             if layout.delimiter == "," and count == 2 * layout.width:
                 return DataError(
                     f"{shown}: line {number} has {count} cells where the first line has {layout.width}, so commas may "
-                    "be decimal marks there as well as separate cells; write it with points, or semicolons between cells"
+                    "be decimal marks there as well as separate cells; write it with points, or semicolons in between"
                 )
             return DataError(
                 f"{shown}: line {number} has {count} {'cell' if count == 1 else 'cells'} "

@@ -506,8 +506,8 @@ def _of_the_states(
 def _unread_times(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
     """Say which columns are called after time and hold text of which no time can be made."""
     return [
-        f"{_name(report.name, i)} holds text such as {str(looked.texts[i][0])!r}, of which no time can be made: write it "
-        "as 2024-12-31 23:59:59.5, or in seconds"
+        f"{_name(report.name, i)} holds text such as {str(looked.texts[i][0])!r}, of which no time can be made: write "
+        "it as 2024-12-31 23:59:59.5, or in seconds"
         for i, report in enumerate(reports)
         if i in looked.texts
         and TIME_WORDS & set(words(report.name))

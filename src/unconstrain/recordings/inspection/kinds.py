@@ -186,11 +186,11 @@ def with_unit(report: ColumnReport, unit: str, values: Array | None) -> ColumnRe
     kind = next((kind for kind, own in FITTING.items() if unit in own), None)
     if kind == "time":
         here = values[np.isfinite(values)]
-        rises = len(here) > 1 and float(np.mean(np.diff(here) > 0)) > SELDOM
+        rises = len(here) > 1 and float(np.mean(np.diff(here) > 0)) > 0.8
         return replace(report, kind="time", unit=unit) if rises or report.kind == "time" else report
     if EARTH & set(words(report.name)):
         return replace(report, kind="position", unit=unit)
-    unknown = report.kind in ("number", "position", "angle") and kind is not None
+    unknown = report.kind in ("number", "position", "angle") and not NEITHER & set(words(report.name))
     return replace(report, kind=kind if unknown and kind is not None else report.kind, unit=unit)
 
 

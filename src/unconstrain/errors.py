@@ -30,10 +30,12 @@ def show(value: object) -> str:
     Parameters
     ----------
     value : object
+        Of any type.
 
     Returns
     -------
     str
+        At most 60 characters.
     """
     return f"{' '.join(repr(value).split()):.60}"
 

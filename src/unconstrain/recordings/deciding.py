@@ -46,7 +46,7 @@ def decide_kind(recordings: Sequence[Recording], given: str | None) -> tuple[Rec
         raise DataError(
             f"{first.shown}: action_is={given} needs to know the time of each sample; give time= or rate= too"
         )
-    if kind.kind == "increment" or not kind.timed:
+    if kind.kind in ("increment", "scaled") or not kind.timed:
         return tuple(replace(each, kind=kind) for each in recordings)
     return tuple(replace(_differentiated(each), kind=kind) for each in recordings)
 

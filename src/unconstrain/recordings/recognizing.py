@@ -108,12 +108,10 @@ def _files_of_one_kind(folder: Folder) -> list[File]:
     if len(kinds) == 1:
         return list(folder.files(next(iter(kinds))))
     holds = (
-        ", ".join(f"{number} {suffix}" for suffix, number in kinds.items())
-        if kinds
-        else "no file of a known format"
+        f" ({', '.join(f'{number} {suffix}' for suffix, number in kinds.items())} are there)" if kinds else ""
     )
     raise DataError(
-        f"{folder.shown} is a folder without Parquet files ({holds}): give its files, or a pattern such as {pattern}"
+        f"{folder.shown} is a folder without Parquet files: give its files, or a pattern such as {pattern}{holds}"
     )
 
 

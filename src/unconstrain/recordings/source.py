@@ -413,7 +413,7 @@ def open(
 def _of_tables(tables: Tables, columns: Columns, preparation: Preparation) -> Recordings:
     found = tables.recordings[0].kind
     if found.found:  # so that other recordings are read alike
-        preparation = replace(preparation, action_is=found.kind)
+        preparation = replace(preparation, action_is="velocity" if found.kind == "scaled" else found.kind)
     return Recordings(tables, columns, preparation)
 
 

@@ -130,3 +130,28 @@ def test_the_derivative_explains_the_motion_in_any_unit_and_other_numbers_do_not
     assert explained_by(X, V, t, own) > 0.98
     assert explained_by(X, X, t, own) < 0.7
     assert explained_by(X, V * 0, t, own) == pytest.approx(0)
+
+
+def quaternion(n=50):
+    angle = np.linspace(0.1, 1.0, n)
+    return [0 * angle, np.sin(angle / 2) * 0.6, np.sin(angle / 2) * 0.8, np.cos(angle / 2)]
+
+
+def test_a_quaternion_is_of_one_message():
+    names = ["orientation.y", "orientation.z", "orientation.w", "linear.x"]
+    assert not any(report.kind == "quaternion" for report in judge(names, quaternion()))
+    names = [f"orientation.{axis}" for axis in "xyzw"]
+    assert all(report.kind == "quaternion" for report in judge(names, quaternion()))
+
+
+def test_actions_are_no_quaternion():
+    assert not any(
+        report.kind == "quaternion" for report in judge([f"actions[{i}]" for i in range(4)], quaternion())
+    )
+
+
+def test_what_follows_a_pose_in_an_array_is_no_position():
+    wave = np.sin(np.linspace(0, 5, 50))
+    columns = [wave, 2 * wave, 3 * wave, *quaternion(), 10 * wave, 20 * wave]
+    found = judge([f"X[{i}]" for i in range(9)], columns)
+    assert [report.kind for report in found] == ["position"] * 3 + ["quaternion"] * 4 + ["number"] * 2

@@ -1,7 +1,7 @@
 """HDF5 files: robomimic, robosuite, ALOHA, and any other whose groups repeat."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, ClassVar
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.layout import RATES, STEPS
 from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
@@ -25,6 +26,9 @@ MAY_BEGIN_LATER = (".hdf5", ".h5", ".mat")
 
 ENVIRONMENTS = ("env_args", "env_info")
 """Where robomimic and robosuite say how often a robot was controlled."""
+
+MASKS = "mask"
+"""The group in which robomimic keeps lists of demonstrations, to train and to validate."""
 
 DEEPEST = 32
 """Groups within groups."""
@@ -54,6 +58,22 @@ class Hdf5(Nested):
         with self._open() as opened:
             node = self.node(opened, opened, ())
         return node if isinstance(node, dict) else {"root": node}
+
+    def choose(self, tree: dict[str, Node], part: str) -> dict[str, Node]:
+        """Return a part of the tree, or the demonstrations that a list in the file names, as robomimic's masks do."""
+        with damage_named(self.file.shown, self.kind), self._open() as opened:
+            names = self._listed(opened, (part, f"{MASKS}/{part}"))
+        return super().choose(tree, part) if names is None else _keep(tree, names)
+
+    def _listed(self, opened: Any, paths: Sequence[str]) -> frozenset[str] | None:
+        """Return the names in a list of names at one of some paths."""
+        h5py = _library(self.file.shown)
+        for path in paths:
+            item = opened.get(path)
+            if isinstance(item, h5py.Dataset) and item.ndim == 1 and h5py.check_string_dtype(item.dtype):
+                self.check_size(item)
+                return frozenset(item.asstr()[()].tolist())
+        return None
 
     @contextmanager
     def opened(self) -> Iterator[Fetch]:
@@ -138,6 +158,16 @@ class Hdf5(Nested):
             return
         with self.file.open() as content, h5py.File(content, "r") as opened:
             yield opened
+
+
+def _keep(tree: dict[str, Node], names: frozenset[str]) -> dict[str, Node]:
+    """Return a tree in which, where some groups have one of these names, the others beside them are missing."""
+    some = any(name in names and isinstance(node, dict) for name, node in tree.items())
+    return {
+        name: _keep(node, names) if isinstance(node, dict) and not some else node
+        for name, node in tree.items()
+        if not some or name in names or not isinstance(node, dict)
+    }
 
 
 def is_hdf5(file: File) -> bool:

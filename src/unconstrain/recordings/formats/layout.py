@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from unconstrain.recordings.formats.aligning import find_time, name_of, stack_others
 from unconstrain.recordings.formats.borders import Borders, find_borders
 from unconstrain.recordings.formats.stacking import Stacked, find_lengths, stack
 from unconstrain.recordings.formats.trees import (
@@ -26,7 +27,6 @@ from unconstrain.recordings.formats.trees import (
 EPISODE, TIME = "episode", "time"
 """What the columns are called that the file itself does not have."""
 
-TIMES = frozenset({"t", "time", "times", "timestamp", "timestamps", "time_s", "stamp", "stamps"})
 STEPS = frozenset({"dt", "timestep", "time_step", "sample_time"})
 RATES = frozenset(
     {"fps", "hz", "fs", "rate", "freq", "frequency", "control_freq", "sample_rate", "sampling_rate"}
@@ -66,6 +66,8 @@ class Layout(NamedTuple):
         What may say where the episodes of a single demonstration begin.
     time_axis : str or None
         As the user gives it.
+    clock : str or None
+        The path of the column of time, where there is one.
     seconds : tuple of float
         The step of each demonstration, once it was read.
     codes : ndarray of shape (N,) or None
@@ -86,6 +88,7 @@ class Layout(NamedTuple):
     others: tuple[str, ...]
     borders: tuple[Borders, ...]
     time_axis: str | None
+    clock: str | None
     seconds: tuple[float, ...] = ()
     codes: NDArray[np.int64] | None = None
 
@@ -131,6 +134,12 @@ class Layout(NamedTuple):
         held = [name for name in arrays if self.stacked[name].is_held and self.stacked[name].width]
         if held:
             said.append(f"{', '.join(held)}: one value for each demonstration, repeated for all its samples")
+        apart = [name for name in arrays if self.stacked[name].clocks]
+        if apart:
+            said.append(
+                f"{', '.join(apart)}: brought from stamps of its own to those in {self.clock}, real numbers linearly "
+                "and whole ones by the nearest; missing before, after and in gaps; part= reads one group alone"
+            )
         spare = [name for name in arrays if self._is_spare(self.stacked[name])]
         if spare:
             said.append(
@@ -150,7 +159,10 @@ class Layout(NamedTuple):
         return said
 
     def _is_spare(self, each: Stacked) -> bool:
-        return any(each.length(which) not in (None, length) for which, length in enumerate(self.lengths))
+        lengths = [each.length(which) for which in range(len(self.lengths))]
+        return not each.clocks and any(
+            own not in (None, length) for own, length in zip(lengths, self.lengths, strict=True)
+        )
 
     def _order(self, each: Stacked) -> str:
         """Say in which order of the axes an array is read."""
@@ -197,18 +209,16 @@ def lay_out(
     ]
     lengths = find_lengths(arrays, time_axis)
     stacked, unusable = stack(arrays, lengths, labels, time_axis)
+    stacked |= stack_others(arrays, stacked, labels, separator, time_axis)
+    unusable = {path: why for path, why in unusable.items() if path not in stacked}
     stacked = {path: replace(each, kind=_plain(each.kind)) for path, each in stacked.items()}
     beside = outside(tree, found, separator)
     for path, node in beside.items():
         reason = node.reason if isinstance(node, Odd) else "lies beside the demonstrations"
         unusable.setdefault(path, reason)
     episode = next(name for name in (EPISODE, "demonstration", "_episode") if name not in stacked)
-    has_time = any(
-        _last(path, separator) in TIMES and not each.width and None not in each.axes
-        for path, each in stacked.items()
-    )
     step, step_name = None, ""
-    if not has_time:
+    if find_time(stacked, separator) is None:
         step, step_name = _find_step(stacked, beside, separator, len(labels))
     text = any(isinstance(label, str) for label in labels)
     return Layout(
@@ -221,11 +231,12 @@ def lay_out(
         TIME if TIME not in stacked else "time_counted",
         step,
         step_name,
-        _last(step_name, separator) in RATES,
+        name_of(step_name, separator) in RATES,
         tuple(path for path, node in beside.items() if numbers_in(node) > 1),
         tuple(separator.join(path) for path in found.others),
         () if found.names else tuple(find_borders(arrays[0], lengths[0], separator)),
         time_axis,
+        find_time(stacked, separator),
     )
 
 
@@ -283,13 +294,13 @@ def _find_step(
     wanted = STEPS | RATES
     for path, each in stacked.items():
         if (
-            _last(path, separator) in wanted
+            name_of(path, separator) in wanted
             and each.kind.kind in "iuf"
             and not any(axis is not None for axis in each.axes)
         ):
             return each, path
     for path, node in beside.items():
-        if isinstance(node, Leaf) and _last(path, separator) in wanted and _is_number(node):
+        if isinstance(node, Leaf) and name_of(path, separator) in wanted and _is_number(node):
             parts = (node,) * n_demonstrations
             return Stacked(parts, (None,) * n_demonstrations, 0, node.kind), path
     return None, ""
@@ -297,10 +308,6 @@ def _find_step(
 
 def _is_number(leaf: Leaf) -> bool:
     return leaf.size == 1 and leaf.kind.kind in "iuf"
-
-
-def _last(path: str, separator: str) -> str:
-    return path.rsplit(separator, 1)[-1].strip().lower()
 
 
 def _plain(kind: np.dtype) -> np.dtype:

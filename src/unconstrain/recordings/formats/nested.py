@@ -15,9 +15,10 @@ from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.aligning import TIMES, bring, name_of
 from unconstrain.recordings.formats.arrays import to_arrow
 from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared, damage_named
-from unconstrain.recordings.formats.layout import MOST_NAMED, TIMES, Layout, lay_out
+from unconstrain.recordings.formats.layout import MOST_NAMED, Layout, lay_out
 from unconstrain.recordings.formats.trees import Leaf, Node, choose_part
 from unconstrain.recordings.table import Column, Header, row
 
@@ -159,13 +160,26 @@ class Nested:
         """Open the file, and return what reads one of its arrays. Each format has its own."""
         raise NotImplementedError
 
+    def choose(self, tree: dict[str, Node], part: str) -> dict[str, Node]:
+        """Return the part of a tree that the user names. Raises `DataError` where there is none."""
+        shown = self.file.shown
+        chosen = choose_part(tree, part, self.separator)
+        if isinstance(chosen, dict):
+            return chosen
+        if not chosen:
+            raise DataError(f"{shown} has no parts to choose from: leave out part=")
+        more = f" and {len(chosen) - MOST_PARTS} more" if len(chosen) > MOST_PARTS else ""
+        raise DataError(
+            f"{shown} has no part that {part!r} alone stands for; there are {', '.join(chosen[:MOST_PARTS])}{more}"
+        )
+
     @cached_property
     def _table(self) -> Layout:
         shown = self.file.shown
         with damage_named(shown, self.kind):
             tree = self.tree()
         if self.part is not None:
-            tree = _choose(tree, self.part, self.separator, shown)
+            tree = self.choose(tree, self.part)
         with damage_named(shown, self.kind):
             table = lay_out(tree, self.separator, self.time_axis, self.episodes_last)
         if not table.stacked or not sum(table.lengths):
@@ -193,7 +207,7 @@ class Nested:
                 (
                     path
                     for path in table.stacked
-                    if path.rsplit(self.separator, 1)[-1].strip().lower() in TIMES and self._increases(path)
+                    if name_of(path, self.separator) in TIMES and self._increases(path)
                 ),
                 None,
             )
@@ -243,7 +257,14 @@ class Nested:
             array = np.asarray(fetch(each.parts[which]))
             if array.shape != each.parts[which].shape:
                 raise ValueError("an array has another shape than it promises")
-            array = each.arrange(which, array, length)
+            if each.clocks:
+                own, at = (
+                    np.asarray(fetch(leaf), np.float64).reshape(-1)
+                    for leaf in (each.clocks[which], table.stacked[str(table.clock)].parts[which])
+                )
+                array = bring(each.arrange(which, array, len(own)), own, at[:length])
+            else:
+                array = each.arrange(which, array, length)
             if held is not None and not each.is_held:
                 held.add(name, array, label)
             values.append(to_arrow(array.astype(each.kind, copy=False)))
@@ -282,18 +303,6 @@ class _Held:
             if more_notes > 0
             else said
         )
-
-
-def _choose(tree: dict[str, Node], part: str, separator: str, shown: str) -> dict[str, Node]:
-    chosen = choose_part(tree, part, separator)
-    if isinstance(chosen, dict):
-        return chosen
-    if not chosen:
-        raise DataError(f"{shown} has no parts to choose from: leave out part=")
-    more = f" and {len(chosen) - MOST_PARTS} more" if len(chosen) > MOST_PARTS else ""
-    raise DataError(
-        f"{shown} has no part that {part!r} alone stands for; there are {', '.join(chosen[:MOST_PARTS])}{more}"
-    )
 
 
 def _with_seconds(table: Layout, fetch: Fetch) -> Layout:

@@ -18,8 +18,8 @@ MOST_HELD = 32
 HELD_FROM = 3
 """Samples, at least, for each of these numbers: an array that is a little shorter than others is another mistake."""
 
-WIDER = 4
-"""How many times more dimensions than samples leave no doubt that an axis is not time."""
+WIDE, WIDER = 64, 4
+"""How many dimensions, and how many times as many as samples, leave no doubt that an axis is not time."""
 
 SPARE_FROM = 30
 """Samples of a demonstration from which arrays that have one more are taken to begin with the others."""
@@ -39,12 +39,15 @@ class Stacked:
         Numbers a sample; 0 for an array of one number a sample.
     kind : numpy.dtype
         Of all parts.
+    clocks : tuple of Leaf
+        The stamps of each, where these are others than those of the table; none otherwise.
     """
 
     parts: tuple[Leaf, ...]
     axes: tuple[int | None, ...]
     width: int
     kind: np.dtype
+    clocks: tuple[Leaf, ...] = ()
 
     @property
     def is_held(self) -> bool:
@@ -183,11 +186,11 @@ def _stack_one(
             where = f" in demonstration {label}" if len(nodes) > 1 else ""
             return f"has shape {node.shape}{where}, of which no axis has the {length} samples that other arrays share"
         width = node.size if axis is None else node.size // node.shape[axis]
-        if strict and axis is not None and width > MOST_HELD and width > WIDER * node.shape[axis]:
-            other = "last" if leading else "first"
+        if strict and axis is not None and width > WIDE and width > WIDER * node.shape[axis]:
+            opposite = "last" if leading else "first"
             return (
                 f"has {width} numbers a sample and but {node.shape[axis]} samples, if time is its "
-                f"{'first' if leading else 'last'} axis: time_axis={other} reads it the other way round"
+                f"{'first' if leading else 'last'} axis: time_axis={opposite} reads it the other way round"
             )
         if width > WIDEST:
             return f"holds {width} numbers a sample, as images do"

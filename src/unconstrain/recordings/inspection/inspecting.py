@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.recordings.actions import REACH
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.formats.base import Format, HasParts
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
@@ -434,9 +435,14 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
                     yield from _roles(judged, group, actions, clock, (*notes, *note))
                 elif clock is not None:
                     listed = _several([_name(looked.names[i], i) for i in actions.places])
+                    scaled = (
+                        ", but within -1 and 1, as commands that a controller scales"
+                        if _is_scaled(_matrix(looked.values, actions.places))
+                        else ""
+                    )
                     refused.append(
                         f"{listed}: no derivative of the positions (of whose motion they explain "
-                        f"{max(share, 0.0):.0%}), so the states are differentiated; --action overrules this"
+                        f"{max(share, 0.0):.0%}){scaled}, so the states are differentiated; --action overrules this"
                     )
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
@@ -543,6 +549,11 @@ def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judg
     if step <= 0:
         return 0.0, ""
     return explained_by(X, V * step, rows, judged.codes), f", if samples are {step:.3g} s apart"
+
+
+def _is_scaled(actions: Array) -> bool:
+    largest = float(np.nanmax(np.abs(actions), initial=0.0))
+    return REACH < largest <= 1.0
 
 
 def _clock(place: int, report: ColumnReport, looked: Looked) -> _Clock:

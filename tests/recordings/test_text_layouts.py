@@ -140,3 +140,29 @@ def test_the_unit_of_a_header_is_that_of_the_time(tmp_path, unit, stamps):
     assert load(tmp_path, header + body, time_unit="us", window=1e-6).time[-1] == pytest.approx(
         stamps[-1] / 1e6
     )
+
+
+@pytest.mark.parametrize("write", [str, lambda row: str(row).replace(",", "")])
+def test_lists_in_cells(tmp_path, write):
+    body = "".join(f'{t:.3f},"{write(row)}"\n' for t, row in zip(TIME, X.tolist(), strict=True))
+    demos = load(tmp_path, "t,pos\n" + body, state="pos")
+    np.testing.assert_array_equal(demos.states, X)
+    assert demos.state_names == ("pos[0]", "pos[1]")
+    for odd, sentence in (
+        ('"[1, a]"', "something else than numbers, first at line 27"),
+        ('"[1, 2, 3]"', "differ in length, first at line 27"),
+    ):
+        lines = body.splitlines()
+        lines[25] = f"0.5,{odd}"
+        with pytest.raises(DataError, match=sentence):
+            load(tmp_path, "t,pos\n" + "\n".join(lines * 2) + "\n", state="pos")
+
+
+def test_a_rate_that_the_time_does_not_have_is_told(tmp_path):
+    body = "".join(f"{100 * i};{x:.4f};{y:.4f}\n" for i, (x, y) in enumerate(X))
+    demos = load(tmp_path, f"// Update Rate: 100.0Hz\nSampleTimeFine;x;y\n{body}", time="SampleTimeFine")
+    assert "if it is the time, give rate=10000" in notes(demos)
+    demos = load(
+        tmp_path, f"// Update Rate: 100.0Hz\nSampleTimeFine;x;y\n{body}", time="SampleTimeFine", rate=10000
+    )
+    np.testing.assert_allclose(demos.time, np.arange(N) / 100)

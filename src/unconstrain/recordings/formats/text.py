@@ -71,11 +71,19 @@ class Text(WholeFile):
         columns: list[Column] = []
         seen: dict[str, int] = {}
         layout = self._layout
-        for name, cell, unit in zip(layout.names, layout.cells, self._units, strict=True):
-            seen[name] = seen.get(name, -1) + 1
+        lists: dict[str, tuple[pa.DataType, int | None]] = {}
+        for place, (name, cell, unit) in enumerate(zip(layout.names, layout.cells, self._units, strict=True)):
+            nth = seen[name] = seen.get(name, -1) + 1
             kind = pa.string() if isinstance(cell, int) else cell.kind
-            columns.append(Column(name, kind, None, seen[name], unit=unit))
-        return Header(self.file.shown, columns)
+            width = layout.widths.get(place, 0)
+            if not width or not name:
+                columns.append(Column(name, kind, None, nth, unit=unit))
+                continue
+            lists[name] = pa.list_(pa.float64()), None
+            columns += [
+                Column(f"{name}[{i}]", pa.float64(), None, nth, name, i, width, unit) for i in range(width)
+            ]
+        return Header(self.file.shown, columns, lists)
 
     def declared(self) -> Declared | None:
         """Return the columns that are made: the time, and the episodes of a logger that began anew."""

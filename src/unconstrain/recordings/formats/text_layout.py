@@ -31,6 +31,7 @@ from unconstrain.recordings.formats.text_stamps import make_time
 from unconstrain.recordings.units import plain_unit
 
 SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
+LIST = re.compile(r"[\[(]((?:\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?[,\s]*){2,})[\])]")
 PROBED = 20
 """Lines looked at to find what separates cells."""
 
@@ -120,12 +121,25 @@ def find_layout(data: bytes, shown: str) -> Layout:
         names, units, cells = names[1:], units[1:], cells[1:]
     if isinstance(made, JoinedTime) and not any(names):
         names[made.seconds], names[made.rest] = "sec", "nanosec"
+    notes += [note] if note else []
     if made is not None:
-        notes.append(note)
         names, units, cells = [*names, _unused(TIME, names)], [*units, ""], [*cells, made]
+    widths = {
+        i: own
+        for i, cell in enumerate(cells)
+        if isinstance(cell, int) and names[i] and (own := _list_width(body, cell))
+    }
     heading = tuple(line.strip().encode() for _, line in lines[:headed]) if unnamed is None else ()
     return Layout(
-        delimiter, width, tuple(names), tuple(cells), skipped, tuple(notes), tuple(units), heading=heading
+        delimiter,
+        width,
+        tuple(names),
+        tuple(cells),
+        skipped,
+        tuple(notes),
+        tuple(units),
+        heading=heading,
+        widths=widths,
     )
 
 
@@ -172,6 +186,13 @@ def _names_bodies(rows: list[list[str]]) -> bool:
     lacking = any(cell and not name for cell, name in zip(above, names, strict=True))
     own = [name for name in names if name]
     return lacking or len(set(own)) < len(own)
+
+
+def _list_width(body: list[list[str]], cell: int) -> int:
+    """Return how many numbers the cells of a column hold in brackets, as pandas writes arrays; 0 for none."""
+    every = [found for row in body if (found := LIST.fullmatch(row[cell].strip() if cell < len(row) else ""))]
+    lengths = {len(each[1].replace(",", " ").split()) for each in every}
+    return lengths.pop() if len(every) == len(body) and len(lengths) == 1 else 0
 
 
 def _mark_of_row_names(probe: list[str]) -> str | None:

@@ -2,8 +2,8 @@
 
 import csv
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import islice
 
 from unconstrain.recordings.formats.text_encoding import BOM
@@ -40,6 +40,8 @@ class Layout:
         Whether lines may lack separators at their ends, or have too many.
     ends_at_blank : bool
         Whether an empty line ends the table.
+    widths : dict of int to int
+        Of the columns whose cells are lists of numbers in brackets, how many numbers these hold.
     heading : tuple of bytes
         The lines that name the columns; where they come again, the logger began anew.
     """
@@ -54,6 +56,7 @@ class Layout:
     is_padded: bool = False
     ends_at_blank: bool = False
     heading: tuple[bytes, ...] = ()
+    widths: Mapping[int, int] = field(default_factory=dict)
 
 
 def lines_of(data: bytes) -> list[bytes]:

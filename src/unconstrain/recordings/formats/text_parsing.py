@@ -4,6 +4,7 @@ import csv
 from collections.abc import Callable, Sequence
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv
 
 from unconstrain.errors import DataError
@@ -60,10 +61,10 @@ def parse(
             column, f"{shown}: {called}", called, guesses, may_have_commas=may_have_commas
         )
     columns = [
-        read[cell]
+        _lists(read[cell], layout.widths.get(index, 0), shown, layout.names[index], place)
         if isinstance(cell, int)
         else cell.make(cells_of(cell, read, names, shown, place), len(lines), rows.begins)
-        for cell in cells
+        for index, cell in zip(wanted, cells, strict=True)
     ]
     return columns, tuple(guesses)
 
@@ -94,6 +95,20 @@ def _fill(line: bytes, width: int, delimiter: bytes) -> bytes:
         return line + delimiter * missing
     bare = line.rstrip(delimiter + b" ")
     return bare + delimiter * max(width - 1 - bare.count(delimiter), 0)
+
+
+def _lists(column: pa.Array, width: int, shown: str, name: str, place: Callable[[int], str]) -> pa.Array:
+    """Return cells that hold numbers in brackets as lists of these; other columns, of no width, as they are."""
+    if not width:
+        return column
+    bare = pc.utf8_trim(pc.utf8_trim_whitespace(column), "[]()")
+    parts = pc.split_pattern_regex(pc.utf8_trim(bare, " ,"), r"[,\s]+")
+    try:
+        return parts.cast(pa.list_(pa.float64()))
+    except pa.ArrowInvalid as error:
+        odd = pc.invert(pc.match_substring_regex(bare, r"^[\d\s,.eE+-]*$"))
+        at = f", first at {place(pc.index(odd, True).as_py())}" if pc.any(odd).as_py() else ""
+        raise DataError(f"{shown}: column {name!r} holds lists of something else than numbers{at}") from error
 
 
 def _ragged(rows: Rows, layout: Layout, shown: str, error: Exception) -> DataError:

@@ -14,10 +14,14 @@ RATE = re.compile(
 TIMED = re.compile(
     r"time|stamp|zeit|temps|clock|date|frame|tick|elapsed|count|^t$|^t[ _\[(.]|(^|[ _.])(m|u|n)?secs?", re.I
 )
+STAMPED = re.compile(r"time|stamp|zeit|temps|^t$", re.IGNORECASE)
 REST = re.compile(
     r"(?P<stem>.*?)(?P<small>n|nano|u|micro)(?P<unit>s|secs?|seconds?)(?P<end>\W*)", re.IGNORECASE
 )
 WHOLE = ("s", "sec", "secs", "second", "seconds")
+
+DISAGREES = 0.2
+"""How far steps may be from those of the rate that a header tells."""
 
 EPOCH = range(1_000_000_000, 4_000_000_000)
 """Seconds since 1970."""
@@ -66,11 +70,30 @@ def make_time(
             return JoinedTime(0, 1), "time is made of the first two columns; time= names another column"
         if body and len(body[0]) > 1 and _increases([row[0] for row in body]):
             return None, ""
-    rate = None if tell_time(names) else find_rate(above)
+    rate = find_rate(above)
     if rate is None:
         return None, ""
+    if tell_time(names):
+        return None, _note_disagreement(names, body, rate)
     note = f"no column tells the time, so it is made of the rate of the header, {rate:g} Hz; rate= overrules this"
     return RowTime(rate), note
+
+
+def _note_disagreement(names: Sequence[str], body: Sequence[Sequence[str]], rate: float) -> str:
+    """Say that the steps of the time are not those of the rate of the header in any unit; "" where they are."""
+    for i, name in enumerate(names):
+        own = [row[i] for row in body if i < len(row)]
+        if not (STAMPED.search(name) and _increases(own)):
+            continue
+        numbers = [float(cell.replace(",", ".")) for cell in own]
+        ticks = (numbers[-1] - numbers[0]) / (len(numbers) - 1) * rate
+        if ticks == rate or any(abs(ticks / unit - 1) < DISAGREES for unit in (1.0, 1e3, 1e6, 1e9)):
+            return ""  # frames, or a unit of time
+        return (
+            f"the header says {rate:g} Hz, of which the steps of {name} tell nothing in s, ms, us or ns: if it is the "
+            f"time, give rate={ticks:g}"
+        )
+    return ""
 
 
 def find_pair(names: Sequence[str]) -> tuple[int, int, int] | None:

@@ -19,6 +19,7 @@ from unconstrain.recordings.inspection.command import fit_command
 from unconstrain.recordings.inspection.kinds import TIME as TIME_WORDS
 from unconstrain.recordings.inspection.kinds import (
     ColumnReport,
+    are_tracks,
     epoch_unit,
     judge,
     sign_flips,
@@ -257,7 +258,12 @@ def _inspect(
         with_unit(report, column.unit, values)
         for report, column, values in zip(reports, looked.columns, looked.values, strict=True)
     ]
-    notes += _unread_times(reports, looked)
+    notes += _unread(reports, looked)
+    if are_tracks(looked.names, looked.values):
+        notes.append(
+            "the first two columns are taken for the numbers of frames and of those who are seen in them; --time and "
+            "--episode overrule this, and --rate says how many frames there are a second"
+        )
     reports = [
         replace(report, kind="episode")
         if i in looked.texts and tells_episodes(report.name, looked.texts[i])
@@ -509,16 +515,25 @@ def _of_the_states(
     return timing if there.mean() > SPARSE else judge_stamps(clock.seconds[there], codes[there])
 
 
-def _unread_times(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
-    """Say which columns are called after time and hold text of which no time can be made."""
-    return [
-        f"{_name(report.name, i)} holds text such as {str(looked.texts[i][0])!r}, of which no time can be made: write "
-        "it as 2024-12-31 23:59:59.5, or in seconds"
-        for i, report in enumerate(reports)
-        if i in looked.texts
-        and TIME_WORDS & set(words(report.name))
-        and re.search(r"\d[:./-]\d", "".join(looked.texts[i][:1]))
-    ]
+def _unread(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
+    """Say which columns hold text that looks like times or numbers and is neither."""
+    notes = []
+    odd: list[int] = []
+    for i, report in enumerate(reports):
+        first = "".join(looked.texts[i][:1]) if i in looked.texts else ""
+        if TIME_WORDS & set(words(report.name)) and re.search(r"\d[:./-]\d", first):
+            notes.append(
+                f"{_name(report.name, i)} holds text such as {first!r}, of which no time can be made: write it as "
+                "2024-12-31 23:59:59.5, or in seconds"
+            )
+        elif re.search(r"\d[.,]\d", first):
+            odd.append(i)
+    if odd:
+        named = _several([_name(reports[i].name, i) for i in odd])
+        notes.append(
+            f"{named}: text such as {str(looked.texts[odd[0]][0])!r}, which is no number, and left out"
+        )
+    return notes
 
 
 def _shortest_window(clock: _Clock, codes: Codes) -> float | None:

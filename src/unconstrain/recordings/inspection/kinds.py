@@ -77,8 +77,8 @@ class ColumnReport:
     name : str
         The name, or "" where the file has none.
     kind : str
-        "position", "velocity", "acceleration", "angle", "quaternion", "force", "time", "episode", "index", "flag",
-        "text", "constant", "empty", or "number" where nothing more is known.
+        "position", "velocity", "acceleration", "angle", "quaternion", "rotation", "force", "time", "episode", "index",
+        "flag", "text", "constant", "empty", or "number" where nothing more is known.
     unit : str or None
         The unit, where it is known.
     low, high : float or None
@@ -143,6 +143,12 @@ def judge(
         ColumnReport(name, "text") if values is None else _judge_one(name, values, unit)
         for name, values, unit in zip(names, columns, units, strict=True)
     ]
+    for start in poses(names, columns):
+        for i in range(start, start + 12):
+            is_position = (i - start) % 4 == 3
+            found[i] = replace(found[i], kind="position" if is_position else "rotation", unit=None)
+    if are_tracks(names, columns):
+        found[0], found[1] = replace(found[0], kind="time"), replace(found[1], kind="episode")
     for start, order in quaternions(names, columns):
         for i in range(start, start + 4):
             values = columns[i]
@@ -223,6 +229,58 @@ def quaternions(names: Sequence[str], columns: Sequence[Array | None]) -> list[t
         else:
             start += 1
     return found
+
+
+def poses(names: Sequence[str], columns: Sequence[Array | None]) -> list[int]:
+    """Find the rows of pose matrices: twelve neighbouring columns without names of which nine are a rotation.
+
+    Parameters
+    ----------
+    names : sequence of str
+    columns : sequence of ndarray of shape (N,), or None
+
+    Returns
+    -------
+    list of int
+        The first column of each matrix [R p], written row by row, as KITTI does.
+    """
+    found: list[int] = []
+    start = 0
+    while start + 12 <= len(columns):
+        own = [values for values in columns[start : start + 12] if values is not None]
+        if len(own) == 12 and not any(names[start : start + 12]) and len(own[0]):
+            R = np.stack(own, axis=1).reshape(-1, 3, 4)[:, :, :3]
+            if np.allclose(R @ R.transpose(0, 2, 1), np.eye(3), atol=UNIT_NORM):
+                found.append(start)
+                start += 12
+                continue
+        start += 1
+    return found
+
+
+def are_tracks(names: Sequence[str], columns: Sequence[Array | None]) -> bool:
+    """Whether the first two columns, without names, number frames and those that are seen in them.
+
+    Parameters
+    ----------
+    names : sequence of str
+    columns : sequence of ndarray of shape (N,), or None
+
+    Returns
+    -------
+    bool
+        Whether frames rise for each number, and several numbers share frames.
+    """
+    first = [values for values in columns[:2] if values is not None]
+    if any(names) or len(columns) < 4 or len(first) < 2 or len(first[0]) < 4:
+        return False
+    frames, tracks = first
+    if not all(np.isfinite(each).all() and np.all(each == np.round(each)) for each in first):
+        return False
+    order = np.lexsort((frames, tracks))
+    steps, same = np.diff(frames[order]), np.diff(tracks[order]) == 0
+    shared = len(np.unique(frames)) < len(frames)
+    return shared and bool(np.mean(same) > 0.5) and bool(np.all(steps[same] > 0))
 
 
 def sign_flips(quaternion: Array, episodes: NDArray[np.int64]) -> int:

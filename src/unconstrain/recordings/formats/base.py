@@ -127,8 +127,8 @@ class Format(Protocol):
         ...
 
 
-class WholeFile:
-    """What formats have in common that say nothing of their columns and need nothing but their file.
+class OneFile:
+    """What most formats have in common: they need nothing but their file, and say nothing of its columns.
 
     Parameters
     ----------

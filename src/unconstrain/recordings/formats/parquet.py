@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from unconstrain import demonstrations_file
 from unconstrain.errors import DataError
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import ColumnKey, Declared, damage_named
+from unconstrain.recordings.formats.base import ColumnKey, Declared, OneFile, damage_named
 from unconstrain.recordings.formats.saved import declare
 from unconstrain.recordings.table import Column, Header, is_list, row
 
@@ -27,7 +27,7 @@ BUFFERED = 1 << 20
 """Bytes read at a time of each column of a local file."""
 
 
-class Parquet:
+class Parquet(OneFile):
     """A Parquet file, of which only the columns and the row groups asked for are read.
 
     Parameters
@@ -39,9 +39,6 @@ class Parquet:
     at_once: ClassVar[bool] = False
     threads = True
     """Whether columns are decoded side by side."""
-
-    def __init__(self, file: File) -> None:
-        self.file = file
 
     @classmethod
     def matches(cls, file: File) -> bool:
@@ -93,19 +90,11 @@ class Parquet:
         if at != bounds[groups[-1] + 1]:
             raise DataError(f"{self.file.shown} is damaged: rows are missing from it; write it again")
 
-    def place(self, index: int) -> str:
-        """Say where in the file a row is."""
-        return row(index)
-
     def in_one_thread(self) -> "Parquet":
         """Return the same file, decoded by one thread."""
         alike = copy(self)
         alike.threads = False
         return alike
-
-    def identity(self) -> str:
-        """Say what tells the file from others."""
-        return repr(self.file.identity())
 
     def _order(self, schema: pa.Schema, columns: Sequence[ColumnKey]) -> list[int]:
         order = []

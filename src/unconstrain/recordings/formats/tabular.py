@@ -7,14 +7,14 @@ from typing import Any
 import pyarrow as pa
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.formats.base import ColumnKey, WholeFile, note_guesses
+from unconstrain.recordings.formats.base import ColumnKey, OneFile, note_guesses
 from unconstrain.recordings.formats.parquet import UNIT, describe_columns, flatten
 from unconstrain.recordings.formats.seconds import with_time
 from unconstrain.recordings.table import Header
 from unconstrain.recordings.units import said_of_units, unit_in
 
 
-class Tabular(WholeFile):
+class Tabular(OneFile):
     """A file that is read as a whole into one Arrow table; a subclass says how, in `load_table`.
 
     Parameters

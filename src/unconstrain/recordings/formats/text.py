@@ -12,7 +12,7 @@ import pyarrow as pa
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats import labview, motion_capture, opensim, qualisys
-from unconstrain.recordings.formats.base import ColumnKey, Declared, WholeFile, find_part, note_guesses
+from unconstrain.recordings.formats.base import ColumnKey, Declared, OneFile, find_part, note_guesses
 from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, members, read_text
 from unconstrain.recordings.formats.text_layout import PROBED, find_layout
 from unconstrain.recordings.formats.text_lines import Layout, content, lines_of
@@ -31,7 +31,7 @@ EPISODE = ("episode", "run", "restart")
 """What the column is called that counts where the header comes again: the first of these that is free."""
 
 
-class Text(WholeFile):
+class Text(OneFile):
     """A text table: CSV, TSV and the like, with or without a header, compressed or not.
 
     All columns are text; they become numbers only where they are used, so other columns may hold anything. Found by

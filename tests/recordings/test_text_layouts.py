@@ -85,6 +85,22 @@ def test_a_header_that_comes_again_begins_an_episode(tmp_path, between):
     assert again.n_episodes == 2
 
 
+def test_a_comment_that_names_the_columns_begins_an_episode_too(tmp_path):
+    content = "# t x y\n" + BODY.replace(",", " ")
+    demos = load(tmp_path, content + "# stopped\n" + content)
+    assert demos.n_episodes == 2
+    assert "comes again at line 43" in notes(demos)
+
+
+def test_names_with_line_breaks(tmp_path):
+    demos = load(tmp_path, '"t\n(s)","x\n(mm)","y\n(mm)"\n' + BODY, state=["x (mm)", "y (mm)"], time="t (s)")
+    np.testing.assert_allclose(demos.states, X, atol=1e-4)
+    lines = BODY.splitlines()
+    lines[7] = lines[7].replace("0.140", "lost")
+    with pytest.raises(DataError, match="holds 'lost' at line 12"):
+        load(tmp_path, '"t\n(s)","x\n(mm)","y\n(mm)"\n' + "\n".join(lines) + "\n", state=[1], time=0)
+
+
 @pytest.mark.parametrize(
     "above", ["Sample Rate: 50 Hz", "// Update Rate: 50.0Hz", "FREQUENCY\t50", '"Sampling frequency (Hz)";50']
 )

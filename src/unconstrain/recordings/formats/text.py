@@ -15,7 +15,7 @@ from unconstrain.recordings.formats import labview, motion_capture, opensim, qua
 from unconstrain.recordings.formats.base import ColumnKey, Declared, OneFile, find_part, note_guesses
 from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, members, read_text
 from unconstrain.recordings.formats.text_layout import PROBED, find_layout
-from unconstrain.recordings.formats.text_lines import Layout, content, lines_of
+from unconstrain.recordings.formats.text_lines import Layout, content, join_header, lines_of
 from unconstrain.recordings.formats.text_made import Part
 from unconstrain.recordings.formats.text_parsing import parse
 from unconstrain.recordings.formats.text_rows import Rows, begins_anew, find_rows
@@ -142,12 +142,13 @@ class Text(OneFile):
 
     def _read(self) -> tuple[bytes, tuple[str, ...]]:
         """Return the whole text in UTF-8, and what was guessed of its encoding."""
-        return read_text(self.file, self.part)
+        data, guesses = read_text(self.file, self.part)
+        return join_header(data), guesses
 
     def _begin(self) -> tuple[bytes, bool]:
         """Return the first lines in UTF-8, and whether they are all there are."""
         data, is_all, _ = begin_text(self.file, self.part)
-        return data, is_all
+        return join_header(data), is_all
 
     def _all_lines(self) -> list[str]:
         return [line.decode() for line in lines_of(self._read()[0])]

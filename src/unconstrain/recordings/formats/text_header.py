@@ -110,19 +110,19 @@ def is_counted(body: Sequence[Sequence[str]]) -> bool:
     return own in ([str(i) for i in range(len(body))], [str(i + 1) for i in range(len(body))])
 
 
-def header_in_comment(data: bytes, delimiter: str, width: int) -> list[str] | None:
-    """Return the names in the last comment before the samples, where it has as many."""
+def header_in_comment(data: bytes, delimiter: str, width: int) -> tuple[list[str], bytes] | None:
+    """Return the names in the last comment before the samples, where it has as many, and the comment."""
     header = b""
     for line in lines_of(data):
         if line.lstrip().startswith(COMMENTS):
-            header = line
+            header = line.strip()
         elif line.strip():
             break
     text = header.decode().lstrip(" #%/")
     names = text.split() if delimiter == " " else [name.strip() for name in text.split(delimiter)]
     if len(names) != width and delimiter == " ":
         names = [name.strip() for name in text.split(",")]
-    return names if len(names) == width > 1 and not any(map(is_number, names)) else None
+    return (names, header) if len(names) == width > 1 and not any(map(is_number, names)) else None
 
 
 def _carried(row: Sequence[str]) -> list[str]:

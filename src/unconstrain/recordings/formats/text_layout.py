@@ -101,8 +101,10 @@ def find_layout(data: bytes, shown: str) -> Layout:
     body = rows[headed:]
     names, units = _name(rows[:headed], body, [number for number, _ in lines], notes)
     width = len(body[0])
+    comments: tuple[bytes, ...] = ()
     if not headed:
-        names = header_in_comment(data, delimiter, width) or [""] * width
+        names, comment = header_in_comment(data, delimiter, width) or ([""] * width, b"")
+        comments = (comment,) if comment else ()
     ends = all(len(row) == width and not row[-1].strip() for row in body)
     if width > 1 and ends and (len(names) == width - 1 or not names[-1]):
         names = names[: width - 1]  # every line ends with a separator
@@ -130,6 +132,7 @@ def find_layout(data: bytes, shown: str) -> Layout:
         if isinstance(cell, int) and names[i] and (own := _list_width(body, cell))
     }
     heading = tuple(line.strip().encode() for _, line in lines[:headed]) if unnamed is None else ()
+    heading = heading or comments
     return Layout(
         delimiter,
         width,

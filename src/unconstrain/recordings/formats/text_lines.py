@@ -12,6 +12,10 @@ from unconstrain.recordings.formats.text_made import Made
 NUMBER = re.compile(r"\s*([+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity))\s*", re.IGNORECASE)
 FLAG = re.compile(r"true|false", re.IGNORECASE)
 COMMENTS = (b"#", b"%", b"//")
+LONGEST_HEADER = 65_536
+MOST_BREAKS = 50
+"""How long a first line may be whose names have line breaks in them: bytes, and lines."""
+
 MARKS = "\t;|,"
 """What separates cells, besides spaces; the comma comes last, as it may be a decimal mark."""
 
@@ -62,6 +66,24 @@ class Layout:
 def lines_of(data: bytes) -> list[bytes]:
     """Return the lines of a text."""
     return data.removeprefix(BOM).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+
+
+def join_header(data: bytes) -> bytes:
+    """Return a text whose first line is whole, where quoted names of columns have line breaks in them.
+
+    Empty lines behind it keep the numbers of all others.
+    """
+    first, _, _ = data.partition(b"\n")
+    if first.count(b'"') % 2 == 0:
+        return data
+    lines = data[:LONGEST_HEADER].split(b"\n")
+    quotes = 0
+    for count, line in enumerate(lines[:MOST_BREAKS], start=1):
+        quotes += line.count(b'"')
+        if quotes % 2 == 0:
+            joined = b" ".join(line.strip() for line in lines[:count])
+            return joined + b"\n" * count + data[sum(map(len, lines[:count])) + count :]
+    return data
 
 
 def content(data: bytes, layout: Layout | None = None) -> Iterator[tuple[int, bytes]]:

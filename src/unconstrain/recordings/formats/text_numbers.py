@@ -23,6 +23,8 @@ WITH_UNIT = (
     r"^(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°%µμΩ][^\d,:;\[\]()]{0,7})$"
 )
 
+DATE = r"^(?:19|20)\d{2}[01]\d[0-3]\d[0-2]\d[0-5]\d[0-5]\d(?:\.?\d{1,9})?$"
+
 MISSING = frozenset(
     {
         "na", "n/a", "n.a.", "<na>", "null", "none", "nil", "missing", "-", "--", "---", ".", "?", "*", "#n/a", "#na",
@@ -68,6 +70,11 @@ def plain_text(
         It cannot be told what commas in numbers mean.
     """
     numbers = _cast(column)
+    if numbers is not None and len(column) and _any(column[:1], DATE):
+        stamps, _ = iso_times(column)
+        if stamps is not column:
+            guesses[f"{called} is read as dates and times written without marks, such as {column[0]}"] = None
+            return stamps
     if numbers is not None:
         return _without_sentinels(column, numbers, called, guesses)
     column = pc.utf8_trim_whitespace(column)

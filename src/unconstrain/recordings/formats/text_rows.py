@@ -1,9 +1,17 @@
 """Which lines of a text are samples: not those where a logger began anew or broke off, nor what stands below."""
 
 import csv
+from bisect import bisect_left
 from dataclasses import dataclass
 
-from unconstrain.recordings.formats.text_lines import Layout, content, is_number, split_line
+from unconstrain.recordings.formats.text_lines import (
+    COMMENTS,
+    Layout,
+    content,
+    is_number,
+    lines_of,
+    split_line,
+)
 from unconstrain.recordings.formats.text_numbers import MISSING
 
 FEWEST = 5
@@ -87,6 +95,11 @@ def _without_headings(
     """Leave out headers that come again, with the titles above them; return what is left, and where they were."""
     if not layout.heading or data.count(layout.heading[0]) < 2:
         return entries, []
+    if layout.heading[0].startswith(COMMENTS):
+        lines = [i for i, line in enumerate(lines_of(data), start=1) if line.strip() == layout.heading[0]]
+        begins = [bisect_left([number for number, _ in entries], number) for number in lines]
+        _note_again(lines[1:], begins[1:], len(entries), notes)
+        return entries, begins
     heading = set(layout.heading)
     kept: list[tuple[int, bytes]] = []
     begins: list[int] = []
@@ -101,14 +114,18 @@ def _without_headings(
         while kept and (not begins or len(kept) > begins[-1]) and _is_title(kept[-1][1], layout):
             kept.pop()
         begins.append(len(kept))
-    inner = [begin for begin in begins if 0 < begin < len(kept)]
-    if inner:
+    _note_again(lines, begins, len(kept), notes)
+    return kept, begins
+
+
+def _note_again(lines: list[int], begins: list[int], count: int, notes: list[str]) -> None:
+    """Note where the header comes again, if samples lie before and after it."""
+    if any(0 < begin < count for begin in begins):
         shown = ", ".join(map(str, lines[:3])) + (f" and {len(lines) - 3} more" if len(lines) > 3 else "")
         notes.append(
             f"the header comes again at line {shown}, and what follows is taken for another episode; episode= "
             "names another column"
         )
-    return kept, begins
 
 
 def _is_title(line: bytes, layout: Layout) -> bool:

@@ -12,7 +12,14 @@ CLOCK = (
     r"(?P<hour>\d{1,2}):(?P<minute>\d{1,2})(?::(?P<second>\d{1,2})(?:[.,:](?P<fraction>\d{1,9}))?)?"
     r"(?: ?(?P<half>[AaPp][Mm]))?"
 )
-YEAR_FIRST = rf"^(?P<year>\d{{4}})[-/.](?P<month>\d{{1,2}})[-/.](?P<day>\d{{1,2}})[ T]+{CLOCK}Z?$"
+YEAR_FIRST = (
+    rf"^(?P<year>\d{{4}})[-/.](?P<month>\d{{1,2}})[-/.](?P<day>\d{{1,2}})[ T]+{CLOCK}"
+    r"(?P<zone> ?(?:Z|UTC|GMT|[+-]\d{2}:?\d{2}))?$"
+)
+COMPACT = (
+    r"^(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})[T_ -]?(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2})"
+    r"[.,]?(?P<fraction>\d{0,9})$"
+)
 YEAR_LAST = (
     rf"^(?P<one>\d{{1,2}})(?P<mark>[-/.])(?P<two>\d{{1,2}})[-/.](?P<year>\d{{4}}|\d{{2}})[, T]+{CLOCK}$"
 )
@@ -46,11 +53,11 @@ def iso_times(column: pa.Array) -> tuple[pa.Array, tuple[str, ...]]:
         What was guessed, as the end of a sentence on the column.
     """
     some = column.drop_null()
-    if not len(some) or ":" not in some[0].as_py():
+    if not len(some) or not (":" in some[0].as_py() or re.match(COMPACT, some[0].as_py())):
         return column, ()
     for pattern, read in (
-        (YEAR_FIRST, _year_first), (YEAR_LAST, _year_last), (BY_NAME, _by_name), (OF_DAY, _of_day),
-        (MINUTES, _minutes),
+        (YEAR_FIRST, _year_first), (COMPACT, _year_first), (YEAR_LAST, _year_last), (BY_NAME, _by_name),
+        (OF_DAY, _of_day), (MINUTES, _minutes),
     ):  # fmt: skip
         if re.match(pattern, some[0].as_py()) and pc.all(pc.match_substring_regex(some, pattern)).as_py():
             parts = pc.extract_regex(some, pattern)
@@ -94,7 +101,10 @@ def _date(year: np.ndarray, month: np.ndarray, day: np.ndarray) -> np.ndarray | 
 
 def _year_first(parts: pa.Array) -> tuple[np.ndarray | None, tuple[str, ...]]:
     date = _date(*(_numbers(parts, name) for name in ("year", "month", "day")))
-    return (None, ()) if date is None else (date + _clock(parts), ())
+    zones = {field.name for field in parts.type} & {"zone"}
+    if date is None or any(len(pc.unique(parts.field(zone))) > 1 for zone in zones):
+        return None, ()
+    return date + _clock(parts), ()
 
 
 def _year_last(parts: pa.Array) -> tuple[np.ndarray | None, tuple[str, ...]]:

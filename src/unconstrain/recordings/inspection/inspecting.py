@@ -57,6 +57,9 @@ MOST_TRIED = 12
 TRIED_ROWS = 3_000_000
 """Rows of files that are read to try a proposal; of more, it is proposed without."""
 
+COARSE = 0.34
+"""Where fewer of the stamps differ from the one before, they are coarser than the samples."""
+
 SPARSE = 0.5
 """Where fewer of the rows hold all columns, these are filled at different rates."""
 
@@ -296,6 +299,9 @@ def _inspect(
     tried = _try(paths, judged, robot, knows, len(alike) == len(found))
     notes += tried.notes
     timing = _of_the_states(timing, clock, codes, looked, tried.states)
+    counted = None if clock is None else _rate_of_runs(clock, codes)
+    if timing is not None and counted is not None:
+        timing = replace(timing, rate_hz=counted)
     reports = [replace(report, name=name) for report, name in zip(tried.reports, looked.names, strict=True)]
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
     rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
@@ -423,8 +429,18 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
         for i, report in enumerate(reports)
         if report.kind in ("number", "position") and rises_evenly(looked.values[i], judged.codes)
     }
+    untimed = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
+    rate = _rate_of_runs(judged.clocks[0], judged.codes) if judged.clocks else None
+    if rate is not None:
+        clocks = [None]
+        called = _name(looked.names[judged.clocks[0].place], judged.clocks[0].place)
+        untimed = (
+            f"{called} has one stamp for many samples in a row, so these are counted instead, at {rate:g} Hz; --rate "
+            "overrules this"
+        )
     for clock in clocks:
         taken = {i for i in (clock.place if clock else None, episode) if i is not None} | counting
+        taken |= {each.place for each in judged.clocks} if rate is not None else set()
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
@@ -453,12 +469,16 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
             elif not any(clocks):
-                text = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
-                yield from _roles(judged, group, None, None, (*notes, text))
+                yield from _roles(judged, group, None, None, (*notes, untimed), rate or 1.0)
 
 
 def _roles(
-    judged: _Judged, group: Group, actions: Group | None, clock: _Clock | None, notes: tuple[str, ...]
+    judged: _Judged,
+    group: Group,
+    actions: Group | None,
+    clock: _Clock | None,
+    notes: tuple[str, ...],
+    rate: float = 1.0,
 ) -> Iterator[_Proposal]:
     looked = judged.looked
     at = looked.positions
@@ -470,7 +490,7 @@ def _roles(
         episode=key_of(judged.episodes[0], looked.columns, at) if judged.episodes else None,
     )
     unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
-    plain = Preparation(time_unit=unit, rate=1.0 if clock is None and actions is None else None)
+    plain = Preparation(time_unit=unit, rate=rate if clock is None and actions is None else None)
     velocities = () if actions is None else actions.places
     yield _Proposal(columns, plain, notes, velocities, group.places)
     if actions is None and clock is not None:
@@ -503,6 +523,21 @@ def _rate_of_each(places: Sequence[int], clock: _Clock | None, judged: _Judged) 
         return None
     rate = judge_stamps(clock.seconds[best], judged.codes[best]).rate_hz
     return None if rate is None else float(f"{rate:.3g}")
+
+
+def _rate_of_runs(clock: _Clock, codes: Codes) -> float | None:
+    """Return the rate (Hz) of samples that share stamps too coarse for them; None where most stamps differ."""
+    order = np.argsort(codes, kind="stable")
+    seconds, own = clock.seconds[order], codes[order]
+    fresh = np.flatnonzero((np.diff(seconds) != 0) | (np.diff(own) != 0)) + 1
+    if len(fresh) < 2 or len(fresh) > COARSE * len(seconds):
+        return None
+    # The first and the last stamp are cut off.
+    lengths, steps = np.diff(fresh), np.diff(seconds[fresh])
+    forward = steps > 0
+    if not forward.any():
+        return None
+    return float(f"{np.median(lengths[forward] / steps[forward]):.3g}")
 
 
 def _of_the_states(

@@ -36,6 +36,11 @@ def folder(tmp_path_factory):
     pos = np.stack([np.cos(t), np.sin(t)], axis=1)
     np.savez(place / "arrays.npz", t=t, pos=pos, vel=pos[:, ::-1] * [-1, 1])
     write_texts(place, t[:40], pos[:40])
+    x = np.random.default_rng(0).normal(size=(200, 2)).cumsum(axis=0)
+    ends = np.array([50, 120, 200])
+    np.savez(place / "replay.npz", **{"data/state": x, "data/action": x, "meta/episode_ends": ends})
+    last = np.isin(np.arange(200), ends - 1)
+    np.savez(place / "d4rl.npz", observations=x, terminals=last & (np.arange(200) < 60), timeouts=last)
     return place
 
 

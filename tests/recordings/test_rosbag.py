@@ -435,3 +435,16 @@ def test_a_folder_of_bags_is_read_bag_by_bag(tmp_path):
     (tmp_path / "bags" / "other.csv").write_text("x\n1\n")
     with pytest.raises(DataError, match=r"2 \.mcap.*1 \.csv"):
         uc.load(tmp_path / "bags", state=XY)
+
+
+@pytest.mark.parametrize("kind", ["mcap", "db3"])
+def test_the_file_of_a_compressed_bag_is_read_too(tmp_path, kind):
+    from rosbags import rosbag2
+
+    bag = Writing(tmp_path / "run", kind)
+    bag._writer.set_compression(rosbag2.CompressionMode.FILE, rosbag2.CompressionFormat.ZSTD)
+    with bag:
+        for i in range(40):
+            bag.stamped_pose("/pose", START + 0.1 * i, circle(0.1 * i))
+    path = next((tmp_path / "run").glob("*.zst*"))
+    np.testing.assert_array_equal(uc.load(path, state=XY).states, uc.load(tmp_path / "run", state=XY).states)

@@ -5,6 +5,8 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
+import pyarrow.fs
+
 from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File, Folder, locate
@@ -14,6 +16,9 @@ from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.nested import Nested
 from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
 from unconstrain.recordings.formats.parquet import Parquet
+
+ZARR = (".zgroup", ".zarray", "zarr.json")
+"""Files by which a folder is a Zarr store."""
 
 
 class Found(NamedTuple):
@@ -102,6 +107,11 @@ def _recordings_of(place: File | Folder, columns: Columns) -> list[_Located]:
 
 def _files_of_one_kind(folder: Folder) -> list[File]:
     """Return the files of a folder, which are a recording each, as a pattern for them would."""
+    if any(folder.file(name).info.type == pyarrow.fs.FileType.File for name in ZARR):
+        raise DataError(
+            f"{folder.shown} is a Zarr store, which is not read: save its arrays with numpy.savez or as HDF5, by the "
+            "same names"
+        )
     suffixes = tuple(suffix for kind in FORMATS for suffix in kind.suffixes)
     kinds = Counter(file.suffix for file in folder.files(suffixes))
     pattern = os.path.join(folder.shown, f"*{next(iter(kinds), '.csv')}")

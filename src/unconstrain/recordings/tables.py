@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.recordings.blocks import Array, Block, Loaded, Motion
 from unconstrain.recordings.loading import check_read, read_blocks
-from unconstrain.recordings.notes import Note, combine
+from unconstrain.recordings.notes import Note, combine, gather
 from unconstrain.recordings.pieces import Piece
 from unconstrain.recordings.reading import BEGINS, KIND, summarize, without_tallies
 from unconstrain.recordings.recording import Recording
@@ -239,7 +239,7 @@ class Tables:
         if timed and timed[0].saves:
             units = ["in s"]
         files = sum(file.file.filesystem is not None for each in self.recordings for file in each.files)
-        return summarize(notes, files, rates, units)
+        return summarize(gather(notes), files, rates, units)
 
     def notes(self) -> tuple[Note, ...]:
         """Return the notes that need no sample to be read: what files said, and what some of them do not have."""

@@ -314,3 +314,18 @@ def test_observations_that_come_next_are_no_states(robomimic):
     names = [column.name for column in uc.inspect(robomimic[0]).columns]
     assert any(name.startswith("next_obs") for name in names)
     assert "next_obs" not in (uc.inspect(robomimic[0]).next or "")
+
+
+def test_a_data_frame_of_pandas_has_its_names(tmp_path):
+    x = np.random.default_rng(0).normal(size=(60, 2))
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        group = file.create_group("run")
+        group.attrs["pandas_type"] = b"frame"
+        group["axis1"] = np.arange(60)
+        group["block0_items"] = np.array([b"px", b"py"])
+        group["block0_values"] = x
+        group["block1_items"] = np.array([b"t"])
+        group["block1_values"] = np.arange(60, dtype="f4")[:, None] / 10
+    demos = uc.load(tmp_path / "a.h5", state=["run/px", "run/py"])
+    np.testing.assert_array_equal(demos.states, x)
+    np.testing.assert_allclose(demos.time, np.arange(60) / 10, atol=1e-5)

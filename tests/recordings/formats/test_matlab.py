@@ -309,3 +309,24 @@ def test_a_single_cell_of_version_7_3_is_not_the_field_of_a_struct(tmp_path):
     demos = uc.load(tmp_path / "m.mat", state="x", action="u")
     assert demos.n_episodes == 2
     assert any("2 demonstrations found in demos" in note for note in demos.notes)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (
+            b"\x06\x00\x00\x00\x00\x00\x00\x00\x05\x00\x00\x00",
+            b"\x06\x08\x00\x00\x00\x00\x00\x00\x05\x00\x00\x00",
+        ),
+        (b"\x09\x00\x00\x00\xe0\x01\x00\x00", b"\xf1\x00\x00\x00\xe0\x01\x00\x00"),
+    ],
+    ids=["no imaginary part", "no such type"],
+)
+def test_damage_at_which_scipy_would_end_the_program_is_a_sentence(tmp_path, before, after):
+    path = tmp_path / "m.mat"
+    scipy.io.savemat(path, {"x": np.random.default_rng(0).normal(size=(20, 3))})
+    content = path.read_bytes()
+    assert before in content
+    path.write_bytes(content.replace(before, after))
+    with pytest.raises(DataError, match="is damaged or not a MATLAB file"):
+        uc.load(path, state="x", rate=1)

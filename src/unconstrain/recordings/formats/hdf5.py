@@ -123,9 +123,30 @@ class Hdf5(Nested):
                 continue
             inner[name] = self.node(part, opened, (*above, item.id))
             steps += _steps(part) if isinstance(part, h5py.Dataset) else ()
+        if item.attrs.get("pandas_type") is not None:
+            return self.frame(item, inner)
         for name, number in steps:
             inner.setdefault(name, Leaf((), number.dtype, number))
         return inner
+
+    def frame(self, group: Any, inner: dict[str, Node]) -> dict[str, Node]:
+        """Describe the columns of a data frame that pandas wrote, whose columns of one type are a block."""
+        columns: dict[str, Node] = {}
+        for name, node in inner.items():
+            items = group.get(name.replace("_values", "_items"))
+            if not (
+                name.endswith("_values")
+                and isinstance(node, Leaf)
+                and len(node.shape) == 2
+                and items is not None
+            ):
+                continue
+            names = [
+                each.decode(errors="replace") if isinstance(each, bytes) else str(each) for each in items[()]
+            ]
+            fields = ((name, (slice(None), i)) for i, name in enumerate(names[: node.shape[1]]))
+            columns |= {name: Leaf(node.shape[:1], node.kind, (node.where, field)) for name, field in fields}
+        return columns or inner
 
     def leaf(self, item: Any) -> Leaf:
         """Describe an array."""

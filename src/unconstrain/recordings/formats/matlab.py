@@ -14,6 +14,7 @@ from unconstrain.memory import available_memory, check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.hdf5 import Hdf5, is_hdf5
+from unconstrain.recordings.formats.matlab_checking import check_variables
 from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
@@ -67,6 +68,8 @@ class Matlab(Nested):
         with damage_named(shown, self.kind):
             needed = len(data) + GROWTH * float(_count_inflated(data))
             check_memory(needed, f"reading {shown}", "write a file a demonstration, or save it with -v7.3")
+            if 0 not in data[:4]:
+                check_variables(data)
             # Cells of a shape that the file cannot hold would be allocated before they are read.
             content: Any = io.BytesIO(data)
             for _, shape, _ in scipy.io.whosmat(content):

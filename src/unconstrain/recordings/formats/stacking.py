@@ -1,5 +1,6 @@
 """Arrays of several demonstrations, stacked along time: which axis that is, and what cannot be stacked."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -227,7 +228,7 @@ def _time_axis(shape: Shape, length: int, leading: bool, strict: bool) -> int | 
         places = [axis for axis, size in enumerate(shape) if size == length + 1]
     if strict and sum(size != 1 for size in shape) > 1:
         places = [axis for axis in places if axis == (0 if leading else len(shape) - 1)]
-    if not places or (length == 1 and int(np.prod(shape, dtype=object)) == 1):
+    if not places or (length == 1 and math.prod(shape) == 1):
         return None
     return places[0] if leading else places[-1]
 

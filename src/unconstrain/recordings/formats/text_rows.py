@@ -102,8 +102,7 @@ def _without_headings(
         return entries, begins
     heading = set(layout.heading)
     kept: list[tuple[int, bytes]] = []
-    begins: list[int] = []
-    lines: list[int] = []
+    begins, lines = [], []
     for number, line in entries:
         if line.strip() not in heading:
             kept.append((number, line))

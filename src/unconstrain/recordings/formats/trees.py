@@ -1,5 +1,6 @@
 """Files that hold a tree of arrays, such as MATLAB and HDF5 files, and where in the tree demonstrations repeat."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -51,7 +52,7 @@ class Leaf:
     @property
     def size(self) -> int:
         """The number of values."""
-        return int(np.prod(self.shape, dtype=object))
+        return math.prod(self.shape)
 
     @property
     def numbers(self) -> int:
@@ -142,9 +143,8 @@ def find_demonstrations(tree: dict[str, Node]) -> Found:
     best = max(candidates, key=_numbers, default=None)
     if best is None or _numbers(best) < _loose(tree):
         return Found((), (), (), (Demonstration(0, tree),))
-    begin = best.path
-    others = {(*other.path, *_last_step(other)) for other in candidates if _is_apart(other, best)}
-    best = replace(best, others=tuple(sorted(each for each in others if each and each != begin)))
+    others = {(*other.path, *_last_step(other)) for other in _apart(candidates, best)}
+    best = replace(best, others=tuple(sorted(each for each in others if each and each != best.path)))
     inner = [find_demonstrations(each.content) for each in best.demonstrations]
     if all(
         each.names and _numbers(each) > MOST_OF * numbers_in(demo.content)
@@ -263,10 +263,15 @@ def _last_step(found: Found) -> tuple[str, ...]:
     return found.members if len(found.members) == 1 else ()
 
 
-def _is_apart(other: Found, best: Found) -> bool:
-    """Whether demonstrations lie neither within others nor around them."""
-    ways = [{(*found.path, name) for name in found.members} for found in (other, best)]
-    return not any(a[: len(b)] == b or b[: len(a)] == a for a in ways[0] for b in ways[1])
+def _apart(candidates: list[Found], best: Found) -> Iterator[Found]:
+    """Yield the demonstrations that lie neither within the best nor around them."""
+    own = {(*best.path, name) for name in best.members}
+    around = {way[:depth] for way in own for depth in range(1, len(way) + 1)}
+    for other in candidates:
+        ways = [(*other.path, name) for name in other.members]
+        within = any(way[:depth] in own for way in ways for depth in range(1, len(way)))
+        if not within and not any(way in around for way in ways):
+            yield other
 
 
 def _loose(tree: Mapping[str, Node]) -> int:
@@ -347,7 +352,7 @@ def _is_repeated(stem: str, arrays: list[Node]) -> bool:
         return True
     shapes = [array.shape for array in arrays if isinstance(array, Leaf)]
     lengths = {max(shape) for shape in shapes}
-    widths = {int(np.prod(shape, dtype=object)) // max(shape) for shape in shapes}
+    widths = {math.prod(shape) // max(shape) for shape in shapes}
     return len(lengths) > 1 and len(widths) == 1
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.recordings.actions import REACH
+from unconstrain.recordings.actions import REACH, find_kind
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.formats.base import Format, HasParts
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
@@ -65,6 +65,13 @@ SPARSE = 0.5
 
 NANOSECOND_STEP = 1e5
 """Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
+
+LIKELY = {
+    "target": "is nearly the commanded state",
+    "increment": "is nearly the step to the next state",
+    "scaled": "lies within -1 and 1, as commands that a controller scales",
+}
+"""What actions are that are no velocities."""
 
 MOVING_TYPES = ("Odometry", "PoseStamped", "JointState", "TransformStamped", "Pose", "Path", "Twist")
 """The kinds of messages that are looked at first, where a file holds several tables."""
@@ -410,9 +417,13 @@ def _for_robot(judged: _Judged) -> Iterator[_Proposal]:
         if share > AGREES:
             yield _Proposal(Columns(), Preparation(), velocities=actions, positions=states)
             return
+        kind = find_kind(
+            _matrix(values, states), _matrix(values, actions), _codes(episode, judged.looked), seconds
+        )
+        likely = LIKELY.get(kind, "may be the commanded state")
         text = (
-            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion): it may be the "
-            "commanded state, so the states are differentiated; --action overrules this"
+            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion): it {likely}, "
+            "so the states are differentiated; --action overrules this"
         )
         yield _Proposal(differentiated, Preparation(), (text,), positions=states)
         return

@@ -112,6 +112,18 @@ def test_a_sheet_that_holds_a_movement_is_found(tmp_path):
     assert code == 0, said
 
 
+def test_the_rate_stands_in_another_sheet(tmp_path):
+    pytest.importorskip("openpyxl")
+    with pd.ExcelWriter(tmp_path / "a.xlsx") as book:
+        pd.DataFrame({"Suit": ["Frame Rate"], "A": [60]}).to_excel(book, sheet_name="Info", index=False)
+        frame = pd.DataFrame(X, columns=["x", "y", "z"])
+        frame.insert(0, "Frame", np.arange(N) + 7)
+        frame.to_excel(book, sheet_name="Hand", index=False)
+    demos = uc.load(tmp_path / "a.xlsx", state=["x", "y", "z"])
+    np.testing.assert_allclose(demos.time, np.arange(N) / 60)
+    assert "time is made of Frame and the rate of the header, 60 Hz" in str(demos.notes)
+
+
 def test_archives(tmp_path):
     path = tmp_path / "a.zip"
     archive(path, a=csv(X))

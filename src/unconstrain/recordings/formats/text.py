@@ -131,6 +131,11 @@ class Text(OneFile):
         )
 
     @property
+    def _beside(self) -> list[str]:
+        """Lines from elsewhere in the file that may tell the rate."""
+        return []
+
+    @property
     def _has_tables(self) -> bool:
         """Whether a part is a table by itself."""
         return bool(members(self.file))
@@ -174,7 +179,7 @@ class Text(OneFile):
             if layout is not None:
                 break
         else:
-            layout = find_layout(data, self.file.shown)
+            layout = find_layout(data, self.file.shown, self._beside)
         if begins_anew(data if is_all else self._read()[0], layout):
             name = next(name for name in EPISODE if name not in layout.names)
             units = (*layout.units, "") if layout.units else ()

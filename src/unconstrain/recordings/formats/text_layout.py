@@ -2,6 +2,7 @@
 
 import csv
 import re
+from collections.abc import Sequence
 from itertools import islice, pairwise
 
 from unconstrain.errors import DataError
@@ -42,7 +43,7 @@ TIME = "time"
 """What the time is called that is made."""
 
 
-def find_layout(data: bytes, shown: str) -> Layout:
+def find_layout(data: bytes, shown: str, beside: Sequence[str] = ()) -> Layout:
     """Find out how a table is written.
 
     Parameters
@@ -51,6 +52,8 @@ def find_layout(data: bytes, shown: str) -> Layout:
         Its first lines, in UTF-8.
     shown : str
         The file, as the user calls it.
+    beside : sequence of str
+        Lines from elsewhere that may tell the rate.
 
     Returns
     -------
@@ -114,7 +117,7 @@ def find_layout(data: bytes, shown: str) -> Layout:
         width = len(names)
     units = (units + [""] * len(names))[: len(names)]
     cells: list[int | Made] = list(range(len(names)))
-    above = [line.decode() for line in lines_of(data)[:skipped]]
+    above = [*(line.decode() for line in lines_of(data)[:skipped]), *beside]
     made, note = make_time(names, body, above)
     if headed and counts_rows(names, body):
         notes.append(

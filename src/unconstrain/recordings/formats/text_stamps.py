@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from itertools import pairwise
 
-from unconstrain.recordings.formats.text_made import JoinedTime, RowTime
+from unconstrain.recordings.formats.text_made import FrameTime, JoinedTime, RowTime
 
 RATE = re.compile(
     r"(?:(?:sampl\w*|update|frame|capture|camera|video|data|acquisition|record\w*|scan|output|measur\w*)[ _-]*)?"
@@ -12,8 +12,9 @@ RATE = re.compile(
     re.IGNORECASE,
 )
 TIMED = re.compile(
-    r"time|stamp|zeit|temps|clock|date|frame|tick|elapsed|count|^t$|^t[ _\[(.]|(^|[ _.])(m|u|n)?secs?", re.I
+    r"time|stamp|zeit|temps|clock|date|tick|elapsed|^t$|^t[ _\[(.]|(^|[ _.])(m|u|n)?secs?", re.IGNORECASE
 )
+COUNTER = re.compile(r"frame|count|^index$|^samples?$", re.IGNORECASE)
 STAMPED = re.compile(r"time|stamp|zeit|temps|^t$", re.IGNORECASE)
 REST = re.compile(
     r"(?P<stem>.*?)(?P<small>n|nano|u|micro)(?P<unit>s|secs?|seconds?)(?P<end>\W*)", re.IGNORECASE
@@ -43,7 +44,7 @@ def tell_time(names: Sequence[str]) -> bool:
 
 def make_time(
     names: Sequence[str], body: Sequence[Sequence[str]], above: Sequence[str]
-) -> tuple[JoinedTime | RowTime | None, str]:
+) -> tuple[FrameTime | JoinedTime | RowTime | None, str]:
     """Make the time that no column holds as it is.
 
     Parameters
@@ -57,7 +58,7 @@ def make_time(
 
     Returns
     -------
-    made : JoinedTime, RowTime or None
+    made : FrameTime, JoinedTime, RowTime or None
     note : str
     """
     pair = find_pair(names)
@@ -75,6 +76,10 @@ def make_time(
         return None, ""
     if tell_time(names):
         return None, _note_disagreement(names, body, rate)
+    frame = _find_counter(names, body)
+    if frame is not None:
+        note = f"time is made of {names[frame]} and the rate of the header, {rate:g} Hz; rate= overrules this"
+        return FrameTime(frame, None, rate), note
     note = f"no column tells the time, so it is made of the rate of the header, {rate:g} Hz; rate= overrules this"
     return RowTime(rate), note
 
@@ -94,6 +99,15 @@ def _note_disagreement(names: Sequence[str], body: Sequence[Sequence[str]], rate
             f"time, give rate={ticks:g}"
         )
     return ""
+
+
+def _find_counter(names: Sequence[str], body: Sequence[Sequence[str]]) -> int | None:
+    """Return the column that counts frames, if there is one."""
+    for i, name in enumerate(names):
+        own = [row[i].strip() for row in body if i < len(row)]
+        if COUNTER.search(name) and all(cell.isdecimal() for cell in own) and _increases(own):
+            return i
+    return None
 
 
 def find_pair(names: Sequence[str]) -> tuple[int, int, int] | None:

@@ -15,6 +15,8 @@ from unconstrain.recordings.formats.base import damage_named, find_part, note_pa
 from unconstrain.recordings.formats.text import Text
 
 BOOK = "xl/workbook.xml"
+LONGEST_ABOUT = 60
+"""Rows of other sheets in which the rate may stand."""
 
 
 class Xlsx(Text):
@@ -50,8 +52,12 @@ class Xlsx(Text):
     def _has_tables(self) -> bool:
         return True
 
+    @property
+    def _beside(self) -> list[str]:
+        return self._sheet[2]
+
     def _read(self) -> tuple[bytes, tuple[str, ...]]:
-        return self._sheet
+        return self._sheet[:2]
 
     def _begin(self) -> tuple[bytes, bool]:
         return self._sheet[0], True
@@ -62,12 +68,18 @@ class Xlsx(Text):
             return tuple(sheet.title for sheet in book.worksheets)
 
     @cached_property
-    def _sheet(self) -> tuple[bytes, tuple[str, ...]]:
+    def _sheet(self) -> tuple[bytes, tuple[str, ...], list[str]]:
+        """The text of the sheet that is read, what was guessed, and the first lines of the others."""
         shown = self.file.shown
         chosen = find_part(self.part, self._sheets, shown)
+        about: dict[str, list[str]] = {}
         best: tuple[int, str, list[list[str]]] = (1, "", [])
         with self._book() as book:
             for sheet in book.worksheets:
+                about[sheet.title] = [
+                    "\t".join(map(_text, row))
+                    for row in sheet.iter_rows(max_row=LONGEST_ABOUT, values_only=True)
+                ]
                 if chosen not in (None, sheet.title):
                     continue
                 rows = [[_text(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
@@ -82,7 +94,8 @@ class Xlsx(Text):
         filled = (row[:width] + [""] * (width - len(row)) if any(row) else [] for row in rows)
         text = "\n".join("\t".join(row) for row in filled) + "\n"
         several = len(self._sheets) > 1 and chosen is None
-        return text.encode(), (note_part(title, self._sheets),) if several else ()
+        beside = [line for other, lines in about.items() if other != title for line in lines]
+        return text.encode(), (note_part(title, self._sheets),) if several else (), beside
 
     @contextmanager
     def _book(self) -> Iterator[Any]:

@@ -69,27 +69,7 @@ def find_layout(data: bytes, shown: str, beside: Sequence[str] = ()) -> Layout:
         raise DataError(f"{shown} is empty: there is nothing to read")
     notes: list[str] = []
     try:
-        given = SEPARATOR.fullmatch(lines[0][1])
-        if given and len(lines) > 1:
-            lines = lines[1:]
-        probe = [line for _, line in lines[:PROBED]]
-        unnamed = None if given else _mark_of_row_names(probe)
-        if unnamed is not None:
-            probe[0] = f'""{unnamed}{probe[0]}'
-            lines[0] = (lines[0][0], probe[0])
-        delimiter = given[1] if given else unnamed or _delimiter(probe)
-        rows = [split_line(line, delimiter) for line in probe]
-        begin = _count_titles(rows)
-        every = probe if len(rows[0]) > 1 else [line for _, line in lines]
-        if not begin and len({len(split_line(line, delimiter)) for line in every}) > 1:
-            delimiter, begin = _find_begin([line for _, line in lines], delimiter, given is not None)
-        if begin:
-            begin -= _names_bodies([split_line(line, delimiter) for _, line in lines[begin - 1 : begin + 2]])
-        if begin:
-            first, last = lines[0][0], lines[begin - 1][0]
-            which = f"line {last} is" if begin == 1 else f"lines {first} to {last} are"
-            notes.append(f"{which} taken for a title, since the table begins after, and left out")
-            lines = lines[begin:]
+        lines, delimiter, lacks_name = _find_table(lines, notes)
         rows = [split_line(line, delimiter) for _, line in lines[:PROBED]]
     except csv.Error as error:
         raise DataError(f"{shown} cannot be read as a text table ({error})") from error
@@ -103,18 +83,11 @@ def find_layout(data: bytes, shown: str, beside: Sequence[str] = ()) -> Layout:
     skipped = lines[headed - 1][0] if headed else lines[0][0] - 1
     body = rows[headed:]
     names, units = _name(rows[:headed], body, [number for number, _ in lines], notes)
-    width = len(body[0])
-    comments: tuple[bytes, ...] = ()
+    heading = () if lacks_name else tuple(line.strip().encode() for _, line in lines[:headed])
     if not headed:
-        names, comment = header_in_comment(data, delimiter, width) or ([""] * width, b"")
-        comments = (comment,) if comment else ()
-    ends = all(len(row) == width and not row[-1].strip() for row in body)
-    if width > 1 and ends and (len(names) == width - 1 or not names[-1]):
-        names = names[: width - 1]  # every line ends with a separator
-    elif len(names) == width + 1 and not names[-1]:
-        names = names[:width]
-    elif len(names) != width:
-        width = len(names)
+        names, comment = header_in_comment(data, delimiter, len(body[0])) or ([""] * len(body[0]), b"")
+        heading = (comment,) if comment else ()
+    names, width = _fit(names, body)
     units = (units + [""] * len(names))[: len(names)]
     cells: list[int | Made] = list(range(len(names)))
     above = [*(line.decode() for line in lines_of(data)[:skipped]), *beside]
@@ -134,8 +107,6 @@ def find_layout(data: bytes, shown: str, beside: Sequence[str] = ()) -> Layout:
         for i, cell in enumerate(cells)
         if isinstance(cell, int) and names[i] and (own := _list_width(body, cell))
     }
-    heading = tuple(line.strip().encode() for _, line in lines[:headed]) if unnamed is None else ()
-    heading = heading or comments
     return Layout(
         delimiter,
         width,
@@ -147,6 +118,43 @@ def find_layout(data: bytes, shown: str, beside: Sequence[str] = ()) -> Layout:
         heading=heading,
         widths=widths,
     )
+
+
+def _find_table(lines: list[tuple[int, str]], notes: list[str]) -> tuple[list[tuple[int, str]], str, bool]:
+    """Return the numbered lines of the table, what separates cells, and whether its first column lacked its name."""
+    given = SEPARATOR.fullmatch(lines[0][1])
+    if given and len(lines) > 1:
+        lines = lines[1:]
+    probe = [line for _, line in lines[:PROBED]]
+    mark = None if given else _mark_of_row_names(probe)
+    if mark is not None:
+        probe[0] = f'""{mark}{probe[0]}'
+        lines[0] = (lines[0][0], probe[0])
+    delimiter = given[1] if given else mark or _delimiter(probe)
+    rows = [split_line(line, delimiter) for line in probe]
+    begin = _count_titles(rows)
+    every = probe if len(rows[0]) > 1 else [line for _, line in lines]
+    if not begin and len({len(split_line(line, delimiter)) for line in every}) > 1:
+        delimiter, begin = _find_begin([line for _, line in lines], delimiter, given is not None)
+    if begin:
+        begin -= _names_bodies([split_line(line, delimiter) for _, line in lines[begin - 1 : begin + 2]])
+    if begin:
+        first, last = lines[0][0], lines[begin - 1][0]
+        which = f"line {last} is" if begin == 1 else f"lines {first} to {last} are"
+        notes.append(f"{which} taken for a title, since the table begins after, and left out")
+        lines = lines[begin:]
+    return lines, delimiter, mark is not None
+
+
+def _fit(names: list[str], body: list[list[str]]) -> tuple[list[str], int]:
+    """Return as many names as there are columns, and the number of cells in a line."""
+    width = len(body[0])
+    ends = all(len(row) == width and not row[-1].strip() for row in body)
+    if width > 1 and ends and (len(names) == width - 1 or not names[-1]):
+        return names[: width - 1], width  # every line ends with a separator
+    if len(names) == width + 1 and not names[-1]:
+        return names[:width], width
+    return names, len(names)
 
 
 def _name(

@@ -64,6 +64,24 @@ def test_a_last_line_without_an_end_is_a_sample(tmp_path):
     assert not notes(load(tmp_path, "t,x,y\n" + BODY.rstrip()))
 
 
+def test_what_is_no_footer_and_no_cut_line(tmp_path):
+    labels = ["r1"] * 20 + ["end"] * 20
+    body = "".join(f"{label},{row}\n" for label, row in zip(labels, ROWS, strict=True))
+    assert load(tmp_path, "run,t,x,y\n" + body, episode="run").episode_labels == ("r1", "end")
+    whole = "\n".join(f"{i / 2},{i / 2 + 0.5},{(i % 5) / 2 + 0.5 * (i < 9)}" for i in range(10))
+    assert len(load(tmp_path, "t,x,y\n" + whole)) == 10
+    wheel = "".join(f"{t:.2f},{i},{i % 7}\n" for i, t in enumerate(TIME))
+    demos = load(tmp_path, "t,s,us\n" + wheel, state=["s", "us"], angle="none")
+    assert not notes(demos)
+    demos = load(
+        tmp_path,
+        "Baud rate: 9600\nfrequency of the filter 6\nx,y\n" + "".join(f"{x},{y}\n" for x, y in X),
+        time=None,
+        rate=50,
+    )
+    assert "rate of the header" not in notes(demos)
+
+
 def test_zeros_that_a_crash_leaves(tmp_path):
     content = ("t,x,y\n" + BODY).encode()
     assert len(load(tmp_path, content + b"\0" * 600)) == N

@@ -20,7 +20,11 @@ FEWEST = 5
 LONGEST_FOOTER = 20
 """Lines below a table."""
 
+FEWEST_DIGITS = 2
+"""Digits behind the points of all numbers by which one that lacks some is told to be cut."""
+
 PROBED = 20
+"""Lines by which others are judged."""
 
 
 @dataclass(frozen=True)
@@ -141,20 +145,28 @@ def _leave_out_half(data: bytes, entries: list[tuple[int, bytes]], layout: Layou
     before = [_cells(other, layout) for _, other in entries[-PROBED:-1]]
     is_short = len(own) < layout.width and not layout.is_padded
     if len(own) == layout.width and all(len(cells) == layout.width for cells in before):
-        last, others = own[-1].strip(), {_decimals(cells[-1]) for cells in before}
-        is_short = (not last and all(cells[-1].strip() for cells in before)) or (
-            len(others) == 1 and -1 < _decimals(last) < min(others)
-        ) or (last.endswith(".") and not any(cells[-1].strip().endswith(".") for cells in before))  # fmt: skip
-        is_short = is_short or (last in ("-", "+") and all(is_number(cells[-1]) for cells in before))
+        is_short = _is_cut(own[-1].strip(), [cells[-1].strip() for cells in before])
     if is_short:
         entries.pop()
         notes.append(f"the last line, {number}, is cut off, and left out")
 
 
+def _is_cut(last: str, above: list[str]) -> bool:
+    """Whether the last cell of a text lacks its end, since all cells above it are longer numbers."""
+    if not last:
+        return all(above)
+    if last in ("-", "+") or (last.endswith(".") and not any(cell.endswith(".") for cell in above)):
+        return all(map(is_number, above))
+    digits = {_decimals(cell) for cell in above}
+    # With fewer digits it is not told from a whole number.
+    return len(digits) == 1 and min(digits) >= FEWEST_DIGITS and -1 < _decimals(last) < min(digits)
+
+
 def _leave_out_footer(entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]) -> None:
     """Leave out lines below the table that say something of it."""
     probe = [_cells(line, layout) for _, line in entries[:PROBED]]
-    numbered = all(cells and any(c.isdigit() for c in cells[0]) for cells in probe)
+    # Labels of episodes may be words in the last lines alone.
+    numbered = all(cells and cells[0].strip(" +-.\"'")[:1].isdigit() for cells in probe)
     kept = len(entries)
     while kept > max(FEWEST, len(entries) - LONGEST_FOOTER):
         cells = _cells(entries[kept - 1][1], layout)

@@ -8,7 +8,7 @@ from unconstrain.recordings.formats.text_made import FrameTime, JoinedTime, RowT
 
 RATE = re.compile(
     r"(?:(?:sampl\w*|update|frame|capture|camera|video|data|acquisition|record\w*|scan|output|measur\w*)[ _-]*)?"
-    r"(?:rate|frequency|freq|fps|hz)\b[^\d\n]{0,20}?(\d+(?:\.\d+)?)\s*(?:hz|fps)?\W*",
+    r"(?:rate|frequency|freq|fps|hz)\b\s*(?:[\[(]\s*\w+\s*[\])])?[\s\"':=,;]*(\d+(?:\.\d+)?)\s*(?:hz|fps)?\W*",
     re.IGNORECASE,
 )
 TIMED = re.compile(
@@ -62,7 +62,7 @@ def make_time(
     note : str
     """
     pair = find_pair(names)
-    if pair is not None:
+    if pair is not None and _are_rests([row[pair[1]] for row in body if pair[1] < len(row)], pair[2]):
         seconds, rest, ticks = pair
         note = f"time is made of {names[seconds]} and {names[rest]}; time= names another column"
         return JoinedTime(seconds, rest, ticks), note
@@ -129,10 +129,17 @@ def find_pair(names: Sequence[str]) -> tuple[int, int, int] | None:
             continue
         stem, end = found["stem"].lower(), found["end"].lower()
         for unit in (found["unit"].lower(), *WHOLE):
+            if not stem and unit == "s":
+                continue  # letters such as these name other things
             whole = places.get(f"{stem}{unit}{end}")
             if whole is not None:
                 return whole, i, 10**9 if found["small"].lower().startswith("n") else 10**6
     return None
+
+
+def _are_rests(cells: Sequence[str], ticks: int) -> bool:
+    """Whether cells hold whole numbers that are less than a second."""
+    return all(cell.strip().isdecimal() and int(cell) < ticks for cell in cells)
 
 
 def _begins_with_stamps(body: Sequence[Sequence[str]]) -> bool:

@@ -51,8 +51,9 @@ def parse(
         lines = [b" ".join(line.split()) for line in lines]
     if layout.is_padded:
         lines = [_fill(line, layout.width, layout.delimiter.encode()) for line in lines]
-    read = _read(lines, layout, needed, shown, rows)
-    may_have_commas = layout.delimiter != "," or any(b'"' in line for line in lines)
+    text = b"\n".join(lines)
+    read = _read(text, layout, needed, shown, rows)
+    may_have_commas = layout.delimiter != "," or b'"' in text
     guesses: dict[str, None] = {}
     for cell, column in read.items():
         name = names.get(cell)
@@ -69,13 +70,11 @@ def parse(
     return columns, tuple(guesses)
 
 
-def _read(
-    lines: list[bytes], layout: Layout, needed: Sequence[int], shown: str, rows: Rows
-) -> dict[int, pa.Array]:
+def _read(text: bytes, layout: Layout, needed: Sequence[int], shown: str, rows: Rows) -> dict[int, pa.Array]:
     unique = [str(i) for i in range(layout.width)]  # names may repeat, positions do not
     try:
         table = pyarrow.csv.read_csv(
-            pa.BufferReader(b"\n".join(lines)),
+            pa.BufferReader(text),
             read_options=pyarrow.csv.ReadOptions(column_names=unique, block_size=1 << 24),
             parse_options=pyarrow.csv.ParseOptions(delimiter=layout.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(

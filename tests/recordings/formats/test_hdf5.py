@@ -307,7 +307,7 @@ def test_scaled_commands_are_said_to_be_no_velocities(tmp_path):
     assert not any("within -1 and 1" in note for note in uc.load(path, state="pos").notes)
     found = uc.inspect(path)
     assert "--action" not in found.next
-    assert any("within -1 and 1, as commands that a controller scales" in note for note in found.notes)
+    assert any("commands within -1 and 1 that a controller scales" in note for note in found.notes)
 
 
 def test_observations_that_come_next_are_no_states(robomimic):

@@ -49,6 +49,7 @@ LAST = np.isin(np.arange(ENDS[-1]), ENDS - 1)
         ({"meta/episode_ends": ENDS}, "meta/episode_ends, which counts the samples up to the end"),
         ({"episode_lengths": np.array(LENGTHS)}, "episode_lengths, which counts the samples of each"),
         ({"dones": LAST}, "dones, which flags the last sample"),
+        ({"dones": LAST | np.roll(LAST, -1)}, "dones, which flags the last sample"),
         (
             {"terminals": LAST & (np.arange(150) < 60), "timeouts": LAST & (np.arange(150) > 60)},
             "terminals or timeouts, which flag the last sample",

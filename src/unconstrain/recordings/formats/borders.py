@@ -87,7 +87,9 @@ class Borders:
             flagged = np.any([each != 0 for each in arrays], axis=0)
             if not flagged.any() or float(np.mean(flagged)) > MOST_FLAGGED:
                 return None
-            begins[1:] = flagged[1:] if self.kind == "first" else flagged[:-1]
+            # A flag that stays for some samples, as that of a success does, ends one episode.
+            first = self.kind == "first"
+            begins[1:] = flagged[1:] & ~flagged[:-1] if first else flagged[:-1] & ~flagged[1:]
         return np.cumsum(begins, dtype=np.int64)
 
 

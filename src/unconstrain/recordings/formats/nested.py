@@ -17,7 +17,7 @@ from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.aligning import TIMES, bring, name_of
 from unconstrain.recordings.formats.arrays import to_arrow
-from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared, damage_named
+from unconstrain.recordings.formats.base import ColumnKey, Declared, damage_named, note_guesses
 from unconstrain.recordings.formats.layout import MOST_NAMED, Layout, lay_out
 from unconstrain.recordings.formats.trees import Leaf, Node, choose_part
 from unconstrain.recordings.table import Column, Header, row
@@ -35,8 +35,9 @@ class Nested:
     """A file that holds a tree of arrays, of which the demonstrations are stacked along time.
 
     A column is called by the path of its array within a demonstration: `pos[0]`, `pos[1]`. The column `episode` tells
-    demonstrations apart. Scalars of a demonstration hold for all its samples; one that is the time step or the rate
-    gives the column `time`, where there is no time.
+    demonstrations apart, or the episodes of a single one, where ends or flags say where these begin. Numbers and short
+    vectors of a demonstration hold for all its samples; a number that is the time step or the rate gives the column
+    `time`, where there is no time. Arrays of another rate are brought to the time.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Nested:
 
     def with_time_axis(self, axis: str) -> "Nested":
         """Return the same file, in whose demonstrations the first or the last axis is time, as a user says."""
-        other = copy(self)
+        other = self._unread()
         other.time_axis = axis
         return other
 
@@ -70,7 +71,7 @@ class Nested:
 
     def for_part(self, name: str) -> "Nested":
         """Return the same file, of which nothing but this part is read. That it is not there, `columns` says."""
-        other = copy(self)
+        other = self._unread()
         other.part = name
         return other
 
@@ -125,8 +126,7 @@ class Nested:
                     whole = high - low == length
                     values = self._read_one(fetch, which, names, held if whole else None)
                     said = [*guesses, *(held.notes() if begin + high == stop else ())]
-                    about = {GUESS: "\n".join(said)} if said else None
-                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=about)
+                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=note_guesses(said))
                     yield begin + low, batch.slice(low, high - low)
                 begin += length
 
@@ -172,6 +172,13 @@ class Nested:
         raise DataError(
             f"{shown} has no part that {part!r} alone stands for; there are {', '.join(chosen[:MOST_PARTS])}{more}"
         )
+
+    def _unread(self) -> "Nested":
+        """Return the same file, of which nothing is known yet."""
+        other = copy(self)
+        for name in ("_table", "_declared"):
+            vars(other).pop(name, None)
+        return other
 
     @cached_property
     def _table(self) -> Layout:

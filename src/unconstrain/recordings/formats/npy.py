@@ -93,7 +93,7 @@ class NpyFolder(Nested):
 
     def identity(self) -> str:
         """Say what tells the files from others."""
-        return repr([each.identity() for each in self._files])
+        return repr((self.part, [each.identity() for each in self._files]))
 
     def tree(self) -> dict[str, Node]:
         """Read the types and shapes of the arrays."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError, UnconstrainError
-from unconstrain.recordings.actions import REACH, find_kind
+from unconstrain.recordings.actions import find_kind
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
 from unconstrain.recordings.formats.base import Format, HasParts
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
@@ -67,9 +67,9 @@ NANOSECOND_STEP = 1e5
 """Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
 
 LIKELY = {
-    "target": "is nearly the commanded state",
-    "increment": "is nearly the step to the next state",
-    "scaled": "lies within -1 and 1, as commands that a controller scales",
+    "target": "commanded states",
+    "increment": "steps to the next state",
+    "scaled": "commands within -1 and 1 that a controller scales",
 }
 """What actions are that are no velocities."""
 
@@ -313,7 +313,7 @@ def _inspect(
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
     rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
     return Inspection(
-        ", ".join(name for name, _, _ in alike),
+        _several([name for name, _, _ in alike]),
         rows,
         n_episodes,
         rate,
@@ -417,12 +417,11 @@ def _for_robot(judged: _Judged) -> Iterator[_Proposal]:
         if share > AGREES:
             yield _Proposal(Columns(), Preparation(), velocities=actions, positions=states)
             return
-        kind = find_kind(
-            _matrix(values, states), _matrix(values, actions), _codes(episode, judged.looked), seconds
-        )
-        likely = LIKELY.get(kind, "may be the commanded state")
+        codes = _codes(episode, judged.looked)
+        kind = _kind_of_actions(_matrix(values, states), _matrix(values, actions), codes, seconds)
+        likely = LIKELY.get(kind, "commanded states, perhaps")
         text = (
-            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion): it {likely}, "
+            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion), but {likely}, "
             "so the states are differentiated; --action overrules this"
         )
         yield _Proposal(differentiated, Preparation(), (text,), positions=states)
@@ -468,14 +467,16 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
                     yield from _roles(judged, group, actions, clock, (*notes, *note))
                 elif clock is not None:
                     listed = _several([_name(looked.names[i], i) for i in actions.places])
-                    scaled = (
-                        ", but within -1 and 1, as commands that a controller scales"
-                        if _is_scaled(_matrix(looked.values, actions.places))
-                        else ""
+                    kind = _kind_of_actions(
+                        _matrix(looked.values, group.places),
+                        _matrix(looked.values, actions.places),
+                        judged.codes,
+                        clock.seconds,
                     )
+                    likely = f", but {LIKELY[kind]}" if kind in LIKELY else ""
                     refused.append(
                         f"{listed}: no derivative of the positions (of whose motion they explain "
-                        f"{max(share, 0.0):.0%}){scaled}, so the states are differentiated; --action overrules this"
+                        f"{max(share, 0.0):.0%}){likely}, so the states are differentiated; --action overrules this"
                     )
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
@@ -612,9 +613,10 @@ def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judg
     return explained_by(X, V * step, rows, judged.codes), f", if samples are {step:.3g} s apart"
 
 
-def _is_scaled(actions: Array) -> bool:
-    largest = float(np.nanmax(np.abs(actions), initial=0.0))
-    return REACH < largest <= 1.0
+def _kind_of_actions(states: Array, actions: Array, codes: Codes, seconds: Array) -> str:
+    """Return what actions are, as `find_kind` has it, of rows in any order of the episodes."""
+    order = np.argsort(codes, kind="stable")
+    return find_kind(states[order], actions[order], codes[order], seconds[order])
 
 
 def _clock(place: int, report: ColumnReport, looked: Looked) -> _Clock:

@@ -203,3 +203,9 @@ def test_eulers_of_motive_are_degrees(tmp_path):
     notes = " ".join(uc.load(path, state="RHand.RX", time="Time (Seconds)", drop="missing").notes)
     assert "Euler angles in the order XYZ" in notes
     assert "RHand.RX in deg" in notes
+
+
+def test_more_names_than_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(vicon().replace(",,LHand,,,RHand,,", ",,LHand,,,RHand,,,,,More"))
+    np.testing.assert_allclose(uc.load(path, state="LHand").states, HAND)

@@ -67,7 +67,7 @@ def find_vicon(lines: Sequence[str], part: str | None = None) -> Layout | None:
     if not per_second > 0:
         return None
     width = max(len(called), len(units))
-    called, named = called + [""] * (width - len(called)), named + [""] * (width - len(named))
+    called, named = (row[:width] + [""] * (width - len(row)) for row in (called, named))
     names = ["Frame", "Sub Frame"]
     owner = ""
     for name, component in zip(named[2:], called[2:], strict=True):

@@ -12,7 +12,14 @@ import pyarrow as pa
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats import labview, motion_capture, opensim, qualisys
-from unconstrain.recordings.formats.base import ColumnKey, Declared, OneFile, find_part, note_guesses
+from unconstrain.recordings.formats.base import (
+    ColumnKey,
+    Declared,
+    OneFile,
+    damage_named,
+    find_part,
+    note_guesses,
+)
 from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, members, read_text
 from unconstrain.recordings.formats.text_layout import PROBED, find_layout
 from unconstrain.recordings.formats.text_lines import Layout, content, join_header, lines_of
@@ -175,7 +182,8 @@ class Text(OneFile):
                 return layout
         find_part(section, (), self.file.shown)
         for find in PROGRAMS:
-            layout = find(lines)
+            with damage_named(self.file.shown, "a text table"):
+                layout = find(lines)
             if layout is not None:
                 break
         else:

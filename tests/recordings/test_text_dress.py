@@ -68,7 +68,8 @@ def test_what_is_guessed_of_a_layout_is_noted(tmp_path):
     notes = read(tmp_path, "Log\n\n" + table("t,x,y\ns,mm,mm")).notes[:-1]
     assert notes == (
         "a.csv: line 1 is taken for a title, since the table begins after, and left out",
-        "a.csv: line 4 holds units, which are not converted: s, mm",
+        "a.csv: line 4 is taken for units: s, mm",
+        "a.csv: units are those of the file, and not converted: x, y in mm",
     )
 
 

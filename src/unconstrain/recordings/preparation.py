@@ -52,7 +52,8 @@ class Preparation:
         duplicates (rows with the stamp of the row before), short (episodes too short to be used), pauses (stretches at
         rest).
     resample : float, optional
-        Samples a second to which episodes are brought by linear interpolation, never across gaps.
+        Samples a second to which episodes are brought by linear interpolation, never across gaps. Columns that are
+        filled at different rates are interpolated each between its own stamps.
     window : float
         Seconds over which states are smoothed when they are differentiated.
     gap : float, optional

@@ -15,7 +15,7 @@ from unconstrain.recordings.columns import NO_ANGLE, Columns
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.formats.base import ColumnKey, Declared, Format
 from unconstrain.recordings.pieces import Piece, read_labels, read_numbers
-from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.preparation import TIME_UNITS, Preparation
 from unconstrain.recordings.roles import Roles
 from unconstrain.recordings.steps import runs
 from unconstrain.recordings.table import Field
@@ -44,6 +44,10 @@ class Episodes(NamedTuple):
 
     values: list[Any]
     labels: list[str]
+
+
+NEEDED = ("state", "relative_to", "action", "time")
+"""What a row must hold to be used."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +155,11 @@ class Recording:
         asked = not (how.gap is how.max_speed is how.resample is None)
         by_time = any(how.drops(what) for what in ("duplicates", "short", "pauses"))
         return self.smooths or asked or by_time or self.kind.kind == "increment"
+
+    @property
+    def fills(self) -> bool:
+        """Whether columns that are filled at different rates are interpolated, each between its own stamps."""
+        return self.timed and self.preparation.resample is not None and not self.saves
 
     @property
     def timed(self) -> bool:
@@ -289,13 +298,18 @@ class Recording:
     def clock(self) -> Clock:
         """How stamps are read, decided by the first rows."""
         assert self.roles.time is not None
-        keys = distinct((self.roles.time,), () if self.roles.episode is None else (self.roles.episode,))
+        episode = () if self.roles.episode is None else (self.roles.episode,)
+        states = self.roles.state if self.preparation.drops("missing") else ()
+        keys = distinct((self.roles.time,), episode, states)
         piece = next(piece for piece in self.read_pieces(keys) if len(piece.rows))
         piece = piece.slice(0, FIRST_ROWS) if not piece.format.at_once else piece
-        if self.preparation.drops("missing"):
-            piece = piece.without(piece.missing(self.roles.time, "time"))
+        timed = self.complete([piece], ("time",))[0]
+        piece = self.complete([piece])[0]
+        piece = piece if len(piece.rows) else timed
         codes, _ = number_values(self.labels([piece]))
         unit = "s" if self.saves else self.preparation.time_unit
+        if unit is None and self.preparation.rate is None and self.roles.time.unit in TIME_UNITS:
+            unit = self.roles.time.unit
         cells = piece.cells(self.roles.time, "time")
         own = Clock.decide(cells, codes, unit, self.preparation.rate)
         if unit is not None or self.leader is None or own.of_type:
@@ -337,9 +351,20 @@ class Recording:
             dict.fromkeys([*distinct(fields), *columns, *distinct(roles.policy if everything else (), last)])
         )
 
-    def complete(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
-        """Leave out the rows without a state, what it is relative to, an action or a stamp, where that is asked for."""
-        if not self.preparation.drops("missing"):
+    def complete(self, pieces: Sequence[Piece], needed: Sequence[str] = NEEDED) -> Sequence[Piece]:
+        """Leave out the rows without a state, what it is relative to, an action or a stamp, where that is asked for.
+
+        Parameters
+        ----------
+        pieces : sequence of Piece
+        needed : sequence of str
+            What must be there.
+
+        Returns
+        -------
+        sequence of Piece
+        """
+        if not (self.preparation.drops("missing") or self.fills):
             return pieces
         roles = self.roles
         several = (
@@ -348,7 +373,7 @@ class Recording:
             ("action", roles.action),
             ("time", () if roles.time is None else (roles.time,)),
         )
-        wanted = [(role, field) for role, fields in several for field in fields]
+        wanted = [(role, field) for role, fields in several if role in needed for field in fields]
         complete = []
         for piece in pieces:
             missing = np.zeros(len(piece.rows), dtype=bool)

@@ -329,14 +329,14 @@ def open(
     Parameters
     ----------
     source : path, pattern, URI, several of them, Demonstrations, data frames, or batches of arrays
-        A file of text (CSV and the like under any suffix, also compressed; exports of Vicon, Motive and OpenSim), JSON
-        Lines, XLSX, C3D, MATLAB, HDF5, NPZ, NPY or Parquet, or a ROS bag; on disk, or at a URI such as
-        ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are
-        parts of one recording, one of .npy arrays, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns
-        have known names. A data frame of pandas or Polars, or an Arrow table, is a recording, and so is each of
-        several. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states
-        (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not
-        known; or a function that returns such an iterable, which can then be read more than once.
+        A file of text (CSV and the like under any suffix, also compressed; exports of Vicon, Motive, Qualisys, OpenSim
+        and LabVIEW), JSON, JSON Lines, XLSX, C3D, Feather, MATLAB, HDF5, NPZ, NPY or Parquet, or a ROS bag; on disk,
+        or at a URI such as ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of
+        Parquet files that are parts of one recording, one of .npy arrays, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1,
+        3.0), whose columns have known names. A data frame of pandas or Polars, or an Arrow table, is a recording, and
+        so is each of several. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups,
+        projections)``: states (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where
+        a constraint is not known; or a function that returns such an iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections, relative_to, angle, rotation : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,15 +13,19 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError, UnconstrainError
 from unconstrain.recordings.actions import find_kind
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
-from unconstrain.recordings.formats.base import Format
+from unconstrain.recordings.formats.base import Format, HasParts
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
 from unconstrain.recordings.inspection.command import fit_command
+from unconstrain.recordings.inspection.kinds import TIME as TIME_WORDS
 from unconstrain.recordings.inspection.kinds import (
     ColumnReport,
+    are_tracks,
     epoch_unit,
     judge,
     sign_flips,
     tells_episodes,
+    with_unit,
+    words,
     wraps,
 )
 from unconstrain.recordings.inspection.looking import Looked, look_at
@@ -53,6 +58,12 @@ MOST_TRIED = 12
 TRIED_ROWS = 3_000_000
 """Rows of files that are read to try a proposal; of more, it is proposed without."""
 
+COARSE = 0.34
+"""Where fewer of the stamps differ from the one before, they are coarser than the samples."""
+
+SPARSE = 0.5
+"""Where fewer of the rows hold all columns, these are filled at different rates."""
+
 NANOSECOND_STEP = 1e5
 """Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
 
@@ -70,13 +81,18 @@ MOST_TOPICS = 30
 """Tables of one file that are looked into."""
 
 
-def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> Inspection:
+def inspect(
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
+) -> Inspection:
     """Look at recordings, and find the command that learns from them.
 
     Parameters
     ----------
     source : path, pattern, URI, or several of them
         Files of any format that `open` reads.
+    part : str, optional
+        Which part of each file, such as a sheet; see `Columns`. By default the one that `open` reads, or else the first
+        that holds a movement.
 
     Returns
     -------
@@ -94,21 +110,29 @@ def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -
     >>> print(uc.inspect("wipe.csv"))  # doctest: +SKIP
     """
     paths = _paths(source)
-    found = open_formats(paths, Columns())
+    chosen = Columns(part=part)
+    found = open_formats(paths, chosen)
     shown, files, robot = found[0]
     topics = _topics(files[0])
     with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
         if topics:
             return _inspect_topics(paths, shown, files[0], topics)
-        return _inspect(paths, found, robot, None)
+        inspected = _inspect(paths, found, robot, chosen)
+        if inspected.next is None and part is None and len(found) == 1 and isinstance(files[0], HasParts):
+            return _inspect_parts(paths, files[0], inspected)
+        return inspected
 
 
-def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[str]:
+def list_keys(
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
+) -> list[str]:
     """List the columns that there are, or, of a file that holds several tables, these.
 
     Parameters
     ----------
     source : path, pattern, URI, or several of them
+    part : str, optional
+        Which part of each file.
 
     Returns
     -------
@@ -121,7 +145,7 @@ def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
         There is no such file, or it cannot be read.
     """
     paths = _paths(source)
-    file = open_formats(paths, Columns())[0].formats[0]
+    file = open_formats(paths, Columns(part=part))[0].formats[0]
     topics = _topics(file)
     if topics:
         return [str(topic) for topic in topics]
@@ -176,7 +200,7 @@ def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic
             continue
         name = topic.name
         try:
-            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, name)
+            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, Columns(topic=name))
         except UnconstrainError as error:
             listed.append(f"topic {name} was not looked into: {error}")
             continue
@@ -188,6 +212,21 @@ def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic
     if best is None:
         return Inspection(shown, 0, 0, None, None, (), (*listed, "no topic holds a movement"), None)
     return replace(best, notes=(*listed, *best.notes))
+
+
+def _inspect_parts(paths: list[Any], file: HasParts, first: Inspection) -> Inspection:
+    """Look into the parts of a file, and take the first that holds a movement, or else the part that is read."""
+    for name in file.parts()[:MOST_TOPICS]:
+        chosen = Columns(part=name)
+        try:
+            one = _inspect(paths, open_formats(paths, chosen), None, chosen)
+        except UnconstrainError:
+            continue
+        if one.next is not None:
+            every = ", ".join(map(repr, file.parts()))
+            other = f"part {name!r} holds a movement; --part chooses another one, of {every}"
+            return replace(one, notes=(other, *one.notes))
+    return first
 
 
 @dataclass(frozen=True)
@@ -204,7 +243,7 @@ def _inspect(
     paths: list[Any],
     found: Sequence[Found],
     robot: LeRobot | None,
-    topic: str | None,
+    chosen: Columns,
 ) -> Inspection:
     shown, first, _ = found[0]
     header = first[0].columns()
@@ -226,6 +265,16 @@ def _inspect(
         notes.append(f"{others} has other columns than {shown}, so that one `fit` cannot read both")
     called = [_called(column.name, column.part_of, column.component, robot) for column in looked.columns]
     reports = judge(called, looked.values, looked.units)
+    reports = [
+        with_unit(report, column.unit, values)
+        for report, column, values in zip(reports, looked.columns, looked.values, strict=True)
+    ]
+    notes += _unread(reports, looked)
+    if are_tracks(looked.names, looked.values):
+        notes.append(
+            "the first two columns are taken for the numbers of frames and of those who are seen in them; --time and "
+            "--episode overrule this, and --rate says how many frames there are a second"
+        )
     reports = [
         replace(report, kind="episode")
         if i in looked.texts and tells_episodes(report.name, looked.texts[i])
@@ -254,9 +303,13 @@ def _inspect(
         )
     reports = _without_held(reports, looked, codes)
     notes += _oddities(reports, looked, codes)
-    judged = _Judged(looked, reports, clocks, episodes, codes, topic)
+    judged = _Judged(looked, reports, clocks, episodes, codes, chosen)
     tried = _try(paths, judged, robot, knows, len(alike) == len(found))
     notes += tried.notes
+    timing = _of_the_states(timing, clock, codes, looked, tried.states)
+    counted = None if clock is None else _rate_of_runs(clock, codes)
+    if timing is not None and counted is not None:
+        timing = replace(timing, rate_hz=counted)
     reports = [replace(report, name=name) for report, name in zip(tried.reports, looked.names, strict=True)]
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
     rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
@@ -279,7 +332,8 @@ class _Judged:
     clocks: list[_Clock]
     episodes: list[int]
     codes: Codes
-    topic: str | None
+    chosen: Columns
+    """The topic or the part that is looked into."""
 
 
 @dataclass(frozen=True)
@@ -287,6 +341,7 @@ class _Tried:
     next: str | None
     notes: list[str]
     reports: list[ColumnReport]
+    states: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -312,7 +367,7 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
     if robot is not None and STATE in robot.features:
         proposals = _for_robot(judged)
     elif knows:
-        proposals = iter([_Proposal(Columns(), Preparation())])
+        proposals = iter([_Proposal(judged.chosen, Preparation())])
     else:
         proposals = _proposals(judged)
     problem = ""
@@ -335,7 +390,8 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
             replace(report, kind=_kind_in(proposal, i, report.kind))
             for i, report in enumerate(judged.reports)
         ]
-        return _Tried(fit_command(paths, proposal.columns, proposal.preparation), notes, reports)
+        command = fit_command(paths, proposal.columns, proposal.preparation)
+        return _Tried(command, notes, reports, proposal.positions)
     return _Tried(None, [*judged.looked.guesses, _why_none(judged, problem)], judged.reports)
 
 
@@ -384,8 +440,18 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
         for i, report in enumerate(reports)
         if report.kind in ("number", "position") and rises_evenly(looked.values[i], judged.codes)
     }
+    untimed = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
+    rate = _rate_of_runs(judged.clocks[0], judged.codes) if judged.clocks else None
+    if rate is not None:
+        clocks = [None]
+        called = _name(looked.names[judged.clocks[0].place], judged.clocks[0].place)
+        untimed = (
+            f"{called} has one stamp for many samples in a row, so these are counted instead, at {rate:g} Hz; --rate "
+            "overrules this"
+        )
     for clock in clocks:
         taken = {i for i in (clock.place if clock else None, episode) if i is not None} | counting
+        taken |= {each.place for each in judged.clocks} if rate is not None else set()
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
@@ -418,16 +484,21 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
             elif not any(clocks):
-                text = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
-                yield from _roles(judged, group, None, None, (*notes, text))
+                yield from _roles(judged, group, None, None, (*notes, untimed), rate or 1.0)
 
 
 def _roles(
-    judged: _Judged, group: Group, actions: Group | None, clock: _Clock | None, notes: tuple[str, ...]
+    judged: _Judged,
+    group: Group,
+    actions: Group | None,
+    clock: _Clock | None,
+    notes: tuple[str, ...],
+    rate: float = 1.0,
 ) -> Iterator[_Proposal]:
     looked = judged.looked
     at = looked.positions
-    columns = Columns(
+    columns = replace(
+        judged.chosen,
         state=keys_of(group.places, looked.columns, at),
         action=None if actions is None else keys_of(actions.places, looked.columns, at),
         time=None if clock is None else key_of(clock.place, looked.columns, at),
@@ -435,10 +506,8 @@ def _roles(
     )
     if group.kind == "rotation":
         columns = replace(columns, rotation=keys_of(group.places, looked.columns, at))
-    if judged.topic is not None:
-        columns = replace(columns, topic=judged.topic)
     unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
-    plain = Preparation(time_unit=unit, rate=1.0 if clock is None and actions is None else None)
+    plain = Preparation(time_unit=unit, rate=rate if clock is None and actions is None else None)
     velocities = () if actions is None else actions.places
     yield _Proposal(columns, plain, notes, velocities, group.places)
     if actions is None and clock is not None:
@@ -448,9 +517,75 @@ def _roles(
                 f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
             )
             yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
+    resampled = _rate_of_each(group.places, clock, judged)
+    if resampled is not None:
+        text = (
+            f"the states are filled at different times, so each is interpolated between its own stamps, to "
+            f"{resampled:g} Hz; --resample names another rate"
+        )
+        yield _Proposal(columns, replace(plain, resample=resampled), (*notes, text), velocities, group.places)
     # Samples are left out only if the recording cannot be used with them.
     dropping = replace(plain, drop="missing,duplicates,short")
     yield _Proposal(columns, dropping, notes, velocities, group.places)
+
+
+def _rate_of_each(places: Sequence[int], clock: _Clock | None, judged: _Judged) -> float | None:
+    """Return the rate (Hz) of the column that is filled most often, where few rows hold all columns."""
+    if clock is None:
+        return None
+    there = np.isfinite(_matrix(judged.looked.values, places))
+    counts = there.sum(axis=0)
+    best = there[:, int(np.argmax(counts))]
+    if there.all(axis=1).sum() > SPARSE * best.sum():
+        return None
+    rate = judge_stamps(clock.seconds[best], judged.codes[best]).rate_hz
+    return None if rate is None else float(f"{rate:.3g}")
+
+
+def _rate_of_runs(clock: _Clock, codes: Codes) -> float | None:
+    """Return the rate (Hz) of samples that share stamps too coarse for them; None where most stamps differ."""
+    order = np.argsort(codes, kind="stable")
+    seconds, own = clock.seconds[order], codes[order]
+    fresh = np.flatnonzero((np.diff(seconds) != 0) | (np.diff(own) != 0)) + 1
+    if len(fresh) < 2 or len(fresh) > COARSE * len(seconds):
+        return None
+    # The first and the last stamp are cut off.
+    lengths, steps = np.diff(fresh), np.diff(seconds[fresh])
+    forward = steps > 0
+    if not forward.any():
+        return None
+    return float(f"{np.median(lengths[forward] / steps[forward]):.3g}")
+
+
+def _of_the_states(
+    timing: Timing | None, clock: _Clock | None, codes: Codes, looked: Looked, states: Sequence[int]
+) -> Timing | None:
+    """Return what the stamps say of the rows that hold states, where most rows hold others."""
+    if timing is None or clock is None or not states:
+        return timing
+    there = np.isfinite(_matrix(looked.values, states)).any(axis=1)
+    return timing if there.mean() > SPARSE else judge_stamps(clock.seconds[there], codes[there])
+
+
+def _unread(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
+    """Say which columns hold text that looks like times or numbers and is neither."""
+    notes = []
+    odd: list[int] = []
+    for i, report in enumerate(reports):
+        first = "".join(looked.texts[i][:1]) if i in looked.texts else ""
+        if TIME_WORDS & set(words(report.name)) and re.search(r"\d[:./-]\d", first):
+            notes.append(
+                f"{_name(report.name, i)} holds text such as {first!r}, of which no time can be made: write it as "
+                "2024-12-31 23:59:59.5, or in seconds"
+            )
+        elif re.search(r"\d[.,]\d", first):
+            odd.append(i)
+    if odd:
+        named = _several([_name(reports[i].name, i) for i in odd])
+        notes.append(
+            f"{named}: text such as {str(looked.texts[odd[0]][0])!r}, which is no number, and left out"
+        )
+    return notes
 
 
 def _shortest_window(clock: _Clock, codes: Codes) -> float | None:

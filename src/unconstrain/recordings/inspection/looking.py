@@ -122,7 +122,8 @@ def look_at(files: Sequence[Format], recordings: Sequence[int]) -> Looked:
     units: list[str | None] = []
     at = {key: i for i, key in enumerate(keys)}
     for place, column in enumerate(columns):
-        numbers, text, unit = _column(column, at, [rows for _, rows in parts], files[0])
+        numbers, text, unit, strays = _column(column, at, [rows for _, rows in parts], files[0])
+        notes += strays
         values.append(numbers)
         units.append(unit)
         if text is not None:
@@ -167,21 +168,38 @@ def _equally_long(header: Header) -> tuple[list[int], list[str]]:
 
 def _column(
     column: Column, at: dict[ColumnKey, int], batches: Sequence[pa.RecordBatch], file: Format
-) -> tuple[Array | None, NDArray[np.str_] | None, str | None]:
+) -> tuple[Array | None, NDArray[np.str_] | None, str | None, list[str]]:
     place = at[column.part_of or column.name, column.nth]
     numbers: list[Array] = []
     unit = None
+    strays: list[str] = []
     for rows in batches:
         cells = Cells(rows.column(place), file.file.shown, column.name, file.place)
         try:
             if column.component is not None:
                 cells = cells.component(column.component, column.width, "state", column.part_of)
             part, unit = _numbers(cells)
+            strays += _strays(cells, part)
         except DataError:
             text = [str(value) for each in batches for value in each.column(place).to_pylist()]
-            return None, np.array(text, dtype=np.str_), None
+            return None, np.array(text, dtype=np.str_), None, []
         numbers.append(part)
-    return np.concatenate(numbers) if numbers else np.zeros(0), None, unit
+    return np.concatenate(numbers) if numbers else np.zeros(0), None, unit, strays
+
+
+def _strays(cells: Cells, numbers: Array) -> list[str]:
+    """Say where text stands in a column of numbers."""
+    if not is_text(cells.values.type) or np.isfinite(numbers).all():
+        return []
+    places = np.flatnonzero(cells.stray_text().to_numpy(zero_copy_only=False))
+    if not len(places):
+        return []
+    first = int(places[0])
+    more = f" and at {len(places) - 1} more" if len(places) > 1 else ""
+    return [
+        f"{cells.called} holds {cells.values[first].as_py()!r} at {cells.place(first)}{more}, where numbers are needed"
+        ": correct it, or leave such rows out with --drop missing"
+    ]
 
 
 def _numbers(cells: Cells) -> tuple[Array, str | None]:
@@ -198,7 +216,7 @@ def _numbers(cells: Cells) -> tuple[Array, str | None]:
             stamps = _cast(values, pa.timestamp("ns"))
             stamps = _cast(values, pa.timestamp("ns", "UTC")) if stamps is None else stamps
             if stamps is None:
-                raise
+                return cells.numbers_or_nan(beside_text=True), None
             return _floats(stamps), "ns"
     if pa.types.is_boolean(kind) or pa.types.is_decimal(kind):
         return _floats(values), None

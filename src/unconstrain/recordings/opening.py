@@ -1,8 +1,7 @@
-"""Finding out what there is in a source: which files, in which formats, and which of their columns is what."""
+"""Opening a source, whatever it is: files, data frames, demonstrations in memory, or batches of arrays."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 from itertools import chain
 from typing import Any
@@ -10,22 +9,17 @@ from typing import Any
 from unconstrain import demonstrations_file
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.recordings.actions import ActionKind
+from unconstrain.recordings.assembling import make_recording
 from unconstrain.recordings.batches import FORMS
-from unconstrain.recordings.columns import DIFFERENTIATE, GOAL, START, Columns
-from unconstrain.recordings.files import File, Folder, label, locate, short_names
-from unconstrain.recordings.formats import lerobot, recognize, rosbag_reading
-from unconstrain.recordings.formats.base import Declared, Format, narrow
+from unconstrain.recordings.columns import GOAL, START, Columns
+from unconstrain.recordings.deciding import decide_kind
+from unconstrain.recordings.files import label as label_files
+from unconstrain.recordings.files import short_names
 from unconstrain.recordings.formats.frame import Frame, is_frame
-from unconstrain.recordings.formats.lerobot import LeRobot
-from unconstrain.recordings.formats.nested import Nested
-from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
-from unconstrain.recordings.formats.parquet import Parquet
 from unconstrain.recordings.formats.saved import InMemory
 from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.recognizing import Found, open_formats
 from unconstrain.recordings.recording import Recording
-from unconstrain.recordings.roles import assign_roles
-from unconstrain.recordings.table import Field
 from unconstrain.recordings.tables import Tables
 
 
@@ -109,8 +103,8 @@ def open_demonstrations(demos: Demonstrations, columns: Columns, preparation: Pr
         raise DataError("demonstrations know their columns: choose among them with select, or give a file")
     arrays = demonstrations_file.arrays_of(demos)
     about = demonstrations_file.describe(demos, {name: name for name in arrays})
-    held = InMemory(arrays, about)
-    return Tables((_recording([held], "these demonstrations", "", "", 0, True, columns, preparation, None),))
+    found = Found("these demonstrations", [InMemory(arrays, about)])
+    return _as_tables([make_recording(found, "", "", 0, True, columns, preparation)], preparation)
 
 
 def open_frames(frames: Sequence[Any], columns: Columns, preparation: Preparation) -> Tables:
@@ -134,15 +128,13 @@ def open_frames(frames: Sequence[Any], columns: Columns, preparation: Preparatio
     DataError
         There are no such columns, or they cannot be used.
     """
-    several = len(frames) > 1
-    names = [f"frame {number}" if several else "this frame" for number in range(len(frames))]
-    recordings = tuple(
-        _recording([Frame(frame, name)], name, name, name, number, not several, columns, preparation, None)
+    alone = len(frames) == 1
+    names = ["this frame"] if alone else [f"frame {number}" for number in range(len(frames))]
+    recordings = [
+        make_recording(Found(name, [Frame(frame, name)]), name, name, number, alone, columns, preparation)
         for number, (frame, name) in enumerate(zip(frames, names, strict=True))
-    )
-    tables = Tables(recordings)
-    tables.check_alike()
-    return tables
+    ]
+    return _as_tables(recordings, preparation)
 
 
 def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparation: Preparation) -> Tables:
@@ -167,221 +159,20 @@ def open_files(paths: list[str | os.PathLike[str]], columns: Columns, preparatio
     DataError
         There are no such files or columns, or they cannot be used.
     """
-    located: list[tuple[str, list[File], LeRobot | None]] = []
-    for place in locate(paths):
-        located += _recordings_of(place, columns)
-    shown = [name for name, _, _ in located]
-    several = len(located) > 1
-    every = [(file, robot is not None or len(files) > 1) for _, files, robot in located for file in files]
-    with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
-        formats = iter(list(pool.map(_open_file, every)))
-    opened = [
-        _joined(name, [narrow(next(formats), columns.topics) for _ in files], preparation.time_axis)
-        for name, files, _ in located
+    every = open_formats(paths, columns, preparation.time_axis)
+    shown = [found.shown for found in every]
+    recordings = [
+        make_recording(found, name, label, number, len(every) == 1, columns, preparation)
+        for number, (found, name, label) in enumerate(
+            zip(every, short_names(shown), label_files(shown), strict=True)
+        )
     ]
-    recordings = tuple(
-        _recording(own, name, short, stem, number, not several, columns, preparation, robot)
-        for number, (own, (name, _, robot), short, stem) in enumerate(
-            zip(opened, located, short_names(shown), label(shown), strict=True)
-        )
-    )
-    tables = Tables(recordings)
-    tables.check_alike()
+    return _as_tables(recordings, preparation)
+
+
+def _as_tables(recordings: Sequence[Recording], preparation: Preparation) -> Tables:
+    """Make one source of recordings: where something has to be guessed, the first decides for all."""
+    Tables(tuple(recordings)).check_alike()
     first = recordings[0]
-    recordings = (first, *(replace(each, leader=first) for each in recordings[1:]))
-    return Tables(_with_kind(recordings, preparation.action_is))
-
-
-def _with_kind(recordings: tuple[Recording, ...], given: str | None) -> tuple[Recording, ...]:
-    """Decide what the actions are, once for all: by the first recording where it is not given."""
-    first = recordings[0]
-    if first.differentiates or first.saves:
-        if given not in (None, "velocity"):
-            raise DataError(
-                f"action_is={given} is about recorded actions, and there are none in {first.shown}: name their columns "
-                "with action=, or leave it out"
-            )
-        return recordings
-    kind = ActionKind(given or first.find_kind(), given is None, first.timed)
-    if kind.kind == "velocity":
-        return recordings
-    if given is not None and not kind.timed:
-        raise DataError(
-            f"{first.shown}: action_is={given} needs to know the time of each sample; give time= or rate= too"
-        )
-    if kind.kind == "increment" or not kind.timed:
-        return tuple(replace(each, kind=kind) for each in recordings)
-    every = []
-    for each in recordings:
-        names = tuple(f"{name}_dot" for name in each.roles.state_names)
-        roles = replace(each.roles, action=(), policy=(), action_names=names)
-        every.append(
-            replace(each, kind=kind, roles=roles, columns=replace(each.columns, action=DIFFERENTIATE))
-        )
-    return tuple(every)
-
-
-def open_formats(
-    paths: list[str | os.PathLike[str]], columns: Columns
-) -> list[tuple[str, list[Format], LeRobot | None]]:
-    """Find the files of each recording and their formats, without asking which column is what.
-
-    Parameters
-    ----------
-    paths : list of path
-        Files, folders, patterns and URIs.
-    columns : Columns
-        As given; they decide whether a folder of saved demonstrations is one recording.
-
-    Returns
-    -------
-    list of (str, list of Format, LeRobot or None)
-        What the user calls it, its files, and the dataset that it is, if any.
-
-    Raises
-    ------
-    DataError
-        There are no such files, or they are of no known format.
-    """
-    return [
-        (
-            shown,
-            _joined(shown, [_open_file((file, robot is not None or len(files) > 1)) for file in files], None),
-            robot,
-        )
-        for place in locate(paths)
-        for shown, files, robot in _recordings_of(place, columns)
-    ]
-
-
-def _open_file(about: tuple[File, bool]) -> Format:
-    file, in_folder = about
-    opened = recognize(file)
-    if in_folder and not isinstance(opened, Parquet | Npy):
-        raise DataError(f"{file.shown} is damaged or not a Parquet file; write it again")
-    if isinstance(opened, Parquet):
-        opened.row_groups  # noqa: B018 - read here, side by side with those of other files
-    return opened
-
-
-def _joined(shown: str, formats: list[Format], time_axis: str | None) -> list[Format]:
-    """Make one format of the arrays of a folder, and say which axis is time; other files are read in turn."""
-    arrays = [each for each in formats if isinstance(each, Npy)]
-    joined: list[Format] = [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
-    if time_axis is None:
-        return joined
-    if not all(isinstance(each, Nested) for each in joined):
-        raise DataError(f"{shown}: time_axis= is for arrays in MATLAB, HDF5 and .npy files; leave it out")
-    return [each.with_time_axis(time_axis) for each in joined if isinstance(each, Nested)]
-
-
-def _recordings_of(place: File | Folder, columns: Columns) -> list[tuple[str, list[File], LeRobot | None]]:
-    if isinstance(place, File):
-        return [(place.shown, [place], None)]
-    if rosbag_reading.is_bag(place):
-        return [(place.shown, [rosbag_reading.as_file(place)], None)]
-    robot = lerobot.recognize(place)
-    files = list(robot.files if robot else place.parquet_files())
-    arrays = [] if files or robot else list(place.files(Npy.suffixes))
-    if arrays and not belong_together(arrays):
-        return [(file.shown, [file], None) for file in arrays]
-    if arrays:
-        return [(place.shown, arrays, None)]
-    if not files:
-        where = os.path.join(place.shown, "*.csv")
-        raise DataError(
-            f"{place.shown} is a folder without Parquet files: give its files, or a pattern such as {where}"
-        )
-    if robot is None and columns.state is None and Parquet(files[0]).declared() is not None:
-        return [(file.shown, [file], None) for file in files]  # each counts its episodes by itself
-    return [(place.shown, files, robot)]
-
-
-def _recording(
-    formats: list[Format],
-    shown: str,
-    name: str,
-    stem: str,
-    number: int,
-    alone: bool,
-    columns: Columns,
-    preparation: Preparation,
-    robot: LeRobot | None,
-) -> Recording:
-    filled = [each for each in formats if each.at_once or sum(each.row_groups) > 0]
-    if not filled:
-        raise DataError(f"{shown} has no samples")
-    if robot is not None:
-        count = sum(sum(each.row_groups) for each in formats)
-        if robot.n_samples is not None and count != robot.n_samples:
-            raise DataError(
-                f"{shown} holds {count} samples where its meta/info.json says {robot.n_samples}; "
-                "download the dataset again, or give its Parquet files themselves"
-            )
-        columns = _by_rate(columns, robot.assign(columns), preparation)
-    header = filled[0].columns()
-    declared = _declared(filled[0], columns)
-    own = columns
-    if declared is not None:
-        own = _by_rate(columns, _with_declared(columns, declared), preparation)
-        if not declared.saved:  # its notes are on what it takes for time
-            notes = declared.notes if columns.time is None else ()
-            declared = replace(declared, notes=tuple(f"{name}: {note}" for note in notes))
-    if (
-        columns.state is None
-        and columns != Columns(topic=columns.topic)
-        and (declared is None or not declared.saved)
-    ):
-        raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
-    try:
-        roles = assign_roles(header, own, declared, preparation, shown)
-    except DataError as error:
-        if declared is None or not declared.saved or columns != Columns():
-            raise
-        raise DataError(
-            f"{shown} is damaged and cannot be read as saved demonstrations ({error!s:.300})"
-        ) from error
-    if robot is not None:
-        roles = replace(
-            roles,
-            state_names=_robot_names(robot, roles.state, roles.state_names),
-            action_names=_robot_names(robot, roles.action or roles.state, roles.action_names),
-        )
-    return Recording(shown, name, stem, number, alone, tuple(filled), roles, own, preparation, declared)
-
-
-def _by_rate(given: Columns, found: Columns, preparation: Preparation) -> Columns:
-    """Leave out the time that a file has of its own where a rate is given instead."""
-    return replace(found, time=given.time) if preparation.rate is not None else found
-
-
-def _declared(file: Format, columns: Columns) -> Declared | None:
-    """Return what a file says of its columns, where that still matters beside what the user says."""
-    try:
-        declared = file.declared()
-    except DataError:
-        if columns.state is None:
-            raise
-        return None
-    return declared if declared is None or columns.state is None or declared.columns.state is None else None
-
-
-def _with_declared(columns: Columns, declared: Declared) -> Columns:
-    own = declared.columns
-    return replace(
-        columns,
-        state=columns.state if own.state is None else own.state,
-        action=own.action if columns.action is None else columns.action,
-        time=own.time if columns.time is None else columns.time,
-        episode=own.episode if columns.episode is None else columns.episode,
-    )
-
-
-def _robot_names(robot: LeRobot, fields: Sequence[Field], names: tuple[str, ...]) -> tuple[str, ...]:
-    """Call components as the dataset calls them."""
-    called = []
-    for field, name in zip(fields, names, strict=True):
-        own = robot.component_names(field.column)
-        derived = "_dot" if name.endswith("_dot") else ""
-        called.append(own[field.component] + derived if own and field.component is not None else name)
-    return tuple(called)
+    led = [first, *(replace(each, leader=first) for each in recordings[1:])]
+    return Tables(decide_kind(led, preparation.action_is))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.blocks import Block, Loaded, Motion
+from unconstrain.recordings.loading import check_read, read_blocks
 from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.pieces import Piece
 from unconstrain.recordings.reading import BEGINS, KIND, summarize, without_tallies
@@ -123,7 +124,7 @@ class Tables:
                 first += recording.n_rows
                 continue
             reached = own
-            for block in recording.blocks(batch_rows, own, end):
+            for block in read_blocks(recording, batch_rows, own, end):
                 yield replace(block, start=first + block.start, stop=first + block.stop)
                 reached = block.stop
             first += reached
@@ -155,7 +156,7 @@ class Tables:
         for recording in self.recordings:
             total = Motion(0, False, 0.0)
             notes: tuple[Note, ...] = ()
-            for block in recording.blocks(batch_rows, everything=True):
+            for block in read_blocks(recording, batch_rows, everything=True):
                 loaded = block.load()
                 own = loaded.motion
                 assert own is not None
@@ -164,7 +165,7 @@ class Tables:
                 )
                 notes = combine((*notes, *loaded.notes))
                 yield loaded
-            recording.check(total, notes)
+            check_read(recording, total, notes)
 
     def check_alike(self) -> None:
         """Refuse recordings whose columns differ: positions may mean other columns in another file.

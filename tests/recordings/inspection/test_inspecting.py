@@ -268,7 +268,7 @@ class Topical(Text):
 def test_the_tables_of_a_file_are_listed_and_looked_into(tmp_path, monkeypatch):
     t, phase = circles()
     path = write(tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase))
-    monkeypatch.setattr("unconstrain.recordings.opening.recognize", Topical)
+    monkeypatch.setattr("unconstrain.recordings.recognizing.recognize", Topical)
     found = uc.inspect(path)
     assert found.notes[:2] == (
         "topic /odom (nav_msgs/msg/Odometry, 300 messages)",

@@ -34,8 +34,8 @@ from unconstrain.recordings.inspection.proposal import (
 )
 from unconstrain.recordings.inspection.result import Inspection
 from unconstrain.recordings.inspection.timing import Timing, explained_by, judge_stamps
-from unconstrain.recordings.opening import open_formats
 from unconstrain.recordings.preparation import TIME_UNITS, Preparation
+from unconstrain.recordings.recognizing import Found, open_formats
 from unconstrain.recordings.source import open as open_recordings
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
         There is no such file, or it cannot be read.
     """
     paths = _paths(source)
-    file = open_formats(paths, Columns())[0][1][0]
+    file = open_formats(paths, Columns())[0].formats[0]
     topics = _topics(file)
     if topics:
         return [str(topic) for topic in topics]
@@ -163,7 +163,7 @@ def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic
             continue
         name = topic.name
         try:
-            one = _inspect(paths, [(shown, [file.for_topics((name,))], None)], None, name)
+            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, name)
         except UnconstrainError as error:
             listed.append(f"topic {name} was not looked into: {error}")
             continue
@@ -189,7 +189,7 @@ class _Clock:
 
 def _inspect(
     paths: list[Any],
-    found: list[tuple[str, list[Format], LeRobot | None]],
+    found: Sequence[Found],
     robot: LeRobot | None,
     topic: str | None,
 ) -> Inspection:

@@ -1,0 +1,33 @@
+"""The step that makes projections of forces or flags."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from unconstrain.constraints.recorded import from_forces_and_flags
+from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
+
+
+def make_projections(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
+    """Make the projections of contact forces or of flags, where they are not read.
+
+    Parameters
+    ----------
+    portion : Portion
+    rows : Rows
+
+    Returns
+    -------
+    Rows
+    tuple of Note
+        None.
+    """
+    recording = portion.recording
+    if not recording.makes_projections:
+        return rows, ()
+    d = recording.roles.n_actions
+    if not len(rows):
+        return replace(rows, projections=np.zeros((0, d, d))), ()
+    threshold = recording.preparation.force_threshold
+    made = from_forces_and_flags(rows.forces, rows.free, rows.U, rows.codes, force_threshold=threshold)
+    return replace(rows, projections=made), ()

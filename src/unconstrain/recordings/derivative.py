@@ -125,6 +125,11 @@ def window_samples(step: float, window: float, polyorder: int = 2) -> int:
     return 2 * half + 1
 
 
+def longest_window(time: Array) -> float:
+    """Return the longest window (s) of which an episode with these stamps (seconds, increasing) has all samples."""
+    return 2 * ((_grid_size(time) - 1) // 2) * _step(time)
+
+
 def spans_window(time: Array, window: float, polyorder: int = 2) -> bool:
     """Whether an episode with these stamps (seconds, increasing) has a full window of samples."""
     if len(time) <= polyorder:

@@ -38,6 +38,14 @@ LARGEST_SHARE = 0.75
 ORDERS = (4, 6, 8)
 """Of the differences between neighbouring samples by which noise is told where the motion is blunted at once."""
 
+KEPT, OF_NORMAL = 0.75, 0.3684
+"""Share of these that count, the smallest, since contacts and jumps are in others; and the mean square of that share of
+normal numbers of variance 1."""
+
+SLACK, SHORTEST = 1.2, 0.6
+"""Instead of the window with the least error the shortest is taken whose error is at most so many times larger, if it is at
+least this share as long: a policy learnt from velocities averages their noise, but what is blunted stays so."""
+
 ROUNDING = 1e-6
 """An error of velocities that is a smaller share of them does not count."""
 
@@ -60,7 +68,8 @@ class Smoothing:
         Standard deviation of the states' noise, root mean square over the states, in their unit. Where noise is not white,
         that of white noise which disturbs slopes over this window as much.
     velocity_noise : float
-        What is left of it in each velocity, in [units of the states] / s. It is correlated over the window.
+        What is left of it in each velocity, in [units of the states] / s. It is correlated over the window, and several
+        times larger next to the ends of an episode.
     error : float
         The same with what smoothing blunts.
     """
@@ -139,12 +148,12 @@ def find_smoothing(
     left = variance * np.array([_gain(stretches, w) for w in windows])
     errors = bias + left
     if window is None:
-        speed = _mean_square(stretches, windows[0])
-        best = int(np.argmax(errors <= max(errors.min(), ROUNDING**2 * speed)))
-        window = max(float(windows[best]), least)
+        exact = ROUNDING**2 * _mean_square(stretches, windows[0])
+        near = (errors <= SLACK**2 * errors.min()) & (windows >= SHORTEST * windows[np.argmin(errors)])
+        window = max(float(windows[np.argmax(near | (errors <= exact))]), least)
     blunted = _at(window, windows, bias)
     n = X.shape[1]
-    noise = variance * _gain(stretches, window, ends=True)
+    noise = variance * _gain(stretches, window)
     return Smoothing(
         window, float(np.sqrt(variance / n)), float(np.sqrt(noise / n)), float(np.sqrt((noise + blunted) / n))
     )
@@ -197,19 +206,13 @@ def _differ(stretches: Sequence[_Stretch], window: float) -> tuple[float, float]
     return total / max(count, 1.0), gain / max(count, 1.0)
 
 
-def _gain(stretches: Sequence[_Stretch], window: float, *, ends: bool = False) -> float:
-    """Return the mean variance of slopes by degree 2 that white noise of variance 1 leaves, in the middle of windows.
-
-    With `ends`, over all samples: next to the ends of an episode slopes are those at the ends of windows.
-    """
+def _gain(stretches: Sequence[_Stretch], window: float) -> float:
+    """Return the mean variance of slopes by degree 2 that white noise of variance 1 leaves in the middle of windows."""
     total = count = 0.0
     for part in stretches:
         n = len(part.states)
         half = min(part.half(window), (n - 1) // 2)
-        each = _variances(half)
-        inside = n - 2 * half
-        mean = (float(np.sum(each)) + (inside - 1) * each[half]) / n if ends else each[half]
-        total += n * mean / part.step**2
+        total += n * 3.0 / (half * (half + 1) * (2 * half + 1)) / part.step**2
         count += n
     return total / count
 
@@ -229,11 +232,17 @@ def _between_neighbours(stretches: Sequence[_Stretch]) -> float:
     """Return the variance of white noise, summed over the states, by high differences of neighbouring samples."""
     found = []
     for order in ORDERS:
-        squares = [np.sum(np.diff(part.states, order, axis=0) ** 2, axis=1) for part in stretches]
-        every = np.concatenate(squares)
+        every = np.concatenate([np.diff(part.states, order, axis=0) for part in stretches])
         if len(every):
-            found.append(float(np.mean(every)) / comb(2 * order, order))
+            found.append(sum(_variance(column) for column in every.T) / comb(2 * order, order))
     return min(found, default=0.0)
+
+
+def _variance(values: Array) -> float:
+    """Return the variance of most values (N,); quantised states that rest have none, and do not count."""
+    squares = np.sort(values[values != 0] ** 2)
+    kept = squares[: int(np.ceil(KEPT * len(squares)))]
+    return float(np.mean(kept)) / OF_NORMAL if len(kept) else 0.0
 
 
 def _between_bursts(steps: Array) -> float:
@@ -251,15 +260,6 @@ def _difference(half: int) -> Array:
     fine = savgol_coeffs(max(2 * half + 1, 5), 4, deriv=1, use="dot")
     plain = savgol_coeffs(2 * half + 1, 2, deriv=1, use="dot")
     return fine - np.pad(plain, (len(fine) - len(plain)) // 2)
-
-
-@cache
-def _variances(half: int) -> Array:
-    """Return the variance of the slope by degree 2 at each sample of a window, from white noise of variance 1."""
-    u = np.arange(-half, half + 1) / half
-    triangle = np.linalg.qr(np.vander(u, 3, increasing=True), mode="r")
-    slopes = np.stack([np.zeros_like(u), np.ones_like(u), 2 * u], axis=1)
-    return np.sum(np.linalg.solve(triangle.T, slopes.T) ** 2, axis=0) / half**2
 
 
 def _at(window: float, windows: Sequence[float] | NDArray[np.float64], values: Sequence[float] | Array) -> float:

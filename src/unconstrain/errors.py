@@ -24,6 +24,22 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def show(value: object) -> str:
+    """Write a value that was given into a sentence: on one line, and not all of it where it is long.
+
+    Parameters
+    ----------
+    value : object
+        Of any type.
+
+    Returns
+    -------
+    str
+        At most 60 characters.
+    """
+    return f"{' '.join(repr(value).split()):.60}"
+
+
 class UnconstrainError(ValueError):
     """A mistake in what the user gave, told in one sentence. Base of the family."""
 

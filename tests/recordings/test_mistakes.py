@@ -382,3 +382,40 @@ def test_an_archive_without_states_is_damaged(tmp_path):
     storage.write(path, storage.Kind.DEMONSTRATIONS, about, arrays | {"states": np.array("x")})
     with pytest.raises(DataError, match="it holds no states"):
         load(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "missing"),
+    [({"action": "u"}, "x"), ({"action": "u", "time": "t"}, "x"), ({"time": "t"}, "x"), ({"time": "t"}, "t")],
+)
+def test_a_recording_with_something_missing_in_every_row(tmp_path, options, missing):
+    path = tmp_path / "a.parquet"
+    columns = {"t": np.arange(30) / 50, "x": np.arange(30.0), "u": np.ones(30)}
+    columns[missing] = np.full(30, np.nan)
+    pq.write_table(pa.table(columns), path)
+    with pytest.raises(
+        DataError, match=r"a.parquet: in each of its 30 rows a state, an action or a stamp is"
+    ):
+        load(path, state="x", drop="missing", **options)
+
+
+def test_a_recording_at_rest_without_its_pauses(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,x\n" + "".join(f"{i / 50},1\n" for i in range(99)))
+    with pytest.raises(DataError, match=r"a.csv: all of it is at rest"):
+        load(path, **XT, drop="pauses")
+
+
+def test_the_row_that_is_named_is_that_of_the_file(tmp_path):
+    path = tmp_path / "a.parquet"
+    x = np.arange(100.0)
+    x[60:] = np.nan
+    lists = [[1.0]] * 100
+    lists[10] = [1.0, 2.0]
+    pq.write_table(pa.table({"x": x, "u": np.ones(100), "n": lists}), path)
+    with pytest.raises(DataError, match=r"is nan at row [6-9]\d |holds nan at row [6-9]\d "):
+        uc.open(path, state="x", action="u").source.sample(50, 0)
+    x[:60] = np.where(np.arange(60) < 5, np.nan, x[:60])
+    pq.write_table(pa.table({"x": x, "u": np.ones(100), "n": lists}), path)
+    with pytest.raises(DataError, match=r"holds a list of 2 at row 10 "):
+        load(path, state="x", action="u", projections="n", drop="missing")

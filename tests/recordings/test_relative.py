@@ -108,3 +108,46 @@ def test_a_circle_about_a_centre_that_wanders_becomes_one_about_the_origin(tmp_p
 def test_mistakes(reaches, options, sentence):
     with pytest.raises(DataError, match=sentence):
         uc.load(reaches, **({"state": ["x", "y"], "time": "t", "episode": "run"} | options))
+
+
+def test_a_stream_places_its_model_among_relative_states(reaches):
+    recordings = read(reaches, relative_to=["gx", "gy"])
+    prepared = {tuple(state) for state in recordings.load().states}
+    states, actions = recordings.source.sample(50, 0)
+    assert states.shape == actions.shape == (50, 2)
+    assert {tuple(state) for state in states} <= prepared
+
+
+def test_an_episode_too_short_for_columns_that_move_is_named(tmp_path):
+    t = np.arange(100) / 50
+    run = np.repeat([0, 1], [97, 3])
+    path = tmp_path / "a.csv"
+    rows = np.column_stack([run, t, np.sin(t), np.cos(t), np.cos(2 * t)])
+    np.savetxt(path, rows, delimiter=",", header="run,t,x,u,g", comments="")
+    given = {"state": "x", "action": "u", "time": "t", "episode": "run", "relative_to": "g"}
+    with pytest.raises(DataError, match=r"a.csv: episode '1.*' has 3 samples .* drop="):
+        uc.load(path, **given)
+    demos = uc.load(path, **given, drop="short")
+    assert len(demos) == 97
+    assert "dropped 1 fragment" in " ".join(demos.notes)
+
+
+def test_columns_that_move_are_not_differentiated_across_a_gap(tmp_path):
+    t = np.arange(100) / 50 + 3.0 * (np.arange(100) >= 50)
+    path = tmp_path / "a.csv"
+    rows = np.column_stack([t, np.sin(t), np.cos(t), 2.0 * t + 30.0 * (t > 3)])
+    np.savetxt(path, rows, delimiter=",", header="t,x,u,g", comments="")
+    demos = uc.load(path, state="x", action="u", time="t", relative_to="g")
+    np.testing.assert_allclose(demos.actions[:, 0], np.cos(t) - 2.0, atol=1e-9)
+    assert demos.n_episodes == 2
+
+
+def test_rows_without_what_states_are_relative_to_can_be_left_out(reaches):
+    lines = reaches.read_text().splitlines()
+    lines[3] = lines[3].rsplit(",", 1)[0] + ","
+    reaches.write_text("\n".join(lines) + "\n")
+    given = {"relative_to": ["gx", "gy"]}
+    with pytest.raises(DataError, match=r"column 'gy' is empty at line 4; .* drop=\"missing\""):
+        read(reaches, **given).load()
+    demos = read(reaches, **given, drop="missing").load()
+    assert len(demos) == 399

@@ -198,3 +198,14 @@ def test_a_stream_learns_what_is_learnt_of_all_at_once(tmp_path, form):
         uc.Columns(**{name: value for name, value in columns.items() if hasattr(uc.Columns(), name)}),
         uc.Preparation(**{name: value for name, value in columns.items() if hasattr(uc.Preparation(), name)}),
     )
+
+
+def test_a_stream_counts_the_fragments_of_one_long_episode_as_loading_does(tmp_path):
+    t = np.arange(200) / 50 + 5.0 * (np.arange(200) >= 100)
+    path = tmp_path / "a.csv"
+    np.savetxt(path, np.column_stack([t, np.sin(t)]), delimiter=",", header="t,x", comments="")
+    recordings = uc.open(path, state="x", time="t")
+    notes = [note for block in recordings.source.blocks(1000) for note in block.load().notes]
+    said = [str(note) for note in recordings.findings(notes)]
+    assert said == list(recordings.load().notes)
+    assert "200 samples, 2 episodes, 1 file, 50 Hz, 3.96 s" in said[-1]

@@ -126,3 +126,22 @@ def test_an_extra_that_is_missing_is_named(tmp_path, monkeypatch, package, name,
         DataError, match=rf"{name} needs the package {package}.*pip install 'unconstrain\[{extra}\]'"
     ):
         uc.load(tmp_path / name, **TXY)
+
+
+def test_what_actions_are_is_found_in_frames_too():
+    t = np.arange(200) / 50
+    x = np.sin(t)
+    frame = pd.DataFrame({"t": t, "x": x, "u": np.append(x[2:], x[-2:])})
+    demos = uc.load(frame, state="x", action="u", time="t")
+    assert "nearly commanded states" in demos.notes[0]
+    np.testing.assert_allclose(demos.actions[:, 0], np.cos(t), atol=0.05)
+    recordings = uc.open(frame, state="x", action="u", time="t")
+    assert recordings.preparation.action_is == "target"  # so that other frames are read alike
+    as_given = uc.load(frame, state="x", action="u", time="t", action_is="velocity")
+    np.testing.assert_array_equal(as_given.actions[:, 0], frame.u)
+
+
+def test_what_actions_are_is_not_asked_of_demonstrations():
+    demos = uc.load(FRAME, **TXY)
+    with pytest.raises(DataError, match="action_is=target is about recorded actions"):
+        uc.open(demos, action_is="target")

@@ -253,3 +253,18 @@ def test_blocks_hold_what_loading_gives(tmp_path, options, batch_rows):
     np.testing.assert_allclose(streamed.predict(whole.states), loaded.predict(whole.states), atol=1e-9)
     read(whole)
     assert any(str(note).startswith(f"read: {len(whole)} samples, 4 episodes") for note in recordings.notes)
+
+
+def test_an_episode_too_short_once_it_is_resampled_is_named_or_left_out(tmp_path):
+    t = np.concatenate([np.arange(300) / 50, np.arange(60) / 50])
+    path = tmp_path / "a.parquet"
+    run = np.repeat(["long", "short"], [300, 60])
+    pq.write_table(pa.table({"t": t, "run": run, "x": np.sin(t)}), path)
+    given = {"state": "x", "time": "t", "episode": "run", "resample": 1.0}
+    with pytest.raises(
+        DataError, match=r"a.parquet: episode 'short' has .* at resample=1 Hz; .* raise resample="
+    ):
+        uc.load(path, **given)
+    demos = uc.load(path, **given, drop="short")
+    assert demos.episode_labels == ("long",)
+    assert len(demos) == 6

@@ -153,7 +153,7 @@ class Batches:
                 loaded,
                 samples=samples._replace(groups=groups),
                 episodes=tuple(Episode((name,), str(name)) for name in names),
-                motion=loaded.motion or Motion(len(U), bool(np.any(U)), 0.0),
+                motion=loaded.motion or Motion.of(U),
             )
 
     def identity(self) -> str:

@@ -27,7 +27,8 @@ class Episode(NamedTuple):
     label: str
 
 
-class Motion(NamedTuple):
+@dataclass(frozen=True)
+class Motion:
     """What moves in samples, before slow ones are left out.
 
     Parameters
@@ -39,9 +40,19 @@ class Motion(NamedTuple):
         The length of the longest action.
     """
 
-    n_samples: int
-    moves: bool
-    fastest: float
+    n_samples: int = 0
+    moves: bool = False
+    fastest: float = 0.0
+
+    @classmethod
+    def of(cls, U: Array) -> "Motion":
+        """Look at actions (N, d)."""
+        return cls(len(U), bool(np.any(U)), float(np.linalg.norm(U, axis=1).max(initial=0.0)))
+
+    def __add__(self, other: "Motion") -> "Motion":
+        """Return the motion of both together."""
+        fastest = max(self.fastest, other.fastest)
+        return Motion(self.n_samples + other.n_samples, self.moves or other.moves, fastest)
 
 
 @dataclass(frozen=True)

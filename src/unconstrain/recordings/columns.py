@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Integral
 
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, show
 
 Key = str | int
 """A column's name, or its position counted from 0; a number that is a column's name means that column."""
@@ -84,9 +84,8 @@ class Columns:
             try:  # NumPy's numbers and arrays, whose comparison with other columns is no truth value
                 plain = int(keys) if isinstance(keys, Integral) else list(keys)
             except TypeError:
-                shown = " ".join(repr(keys).split())
                 raise DataError(
-                    f"{name} takes column names or positions counted from 0, got {shown:.60}"
+                    f"{name} takes column names or positions counted from 0, got {show(keys)}"
                 ) from None
             object.__setattr__(self, name, plain)
         if self.relative_to in ([START], [GOAL]):  # as the command line gives them
@@ -94,12 +93,10 @@ class Columns:
         for name in ("time", "episode", "free"):
             key = getattr(self, name)
             if not isinstance(key, str | Integral | None):
-                shown = " ".join(repr(key).split())
-                raise DataError(f"{name} takes a column's name or position counted from 0, got {shown:.60}")
+                raise DataError(f"{name} takes a column's name or position counted from 0, got {show(key)}")
         topics = [] if self.topic is None else list(self.topics)
         if self.topic is not None and not (topics and all(isinstance(each, str) and each for each in topics)):
-            shown = " ".join(repr(self.topic).split())
-            raise DataError(f"topic takes the name of a topic or a list of them, got {shown:.60}")
+            raise DataError(f"topic takes the name of a topic or a list of them, got {show(self.topic)}")
         if self.projections is not None and not (self.force is self.free is None):
             other = "force" if self.force is not None else "free"
             raise DataError(

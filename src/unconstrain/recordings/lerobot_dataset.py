@@ -16,6 +16,7 @@ from unconstrain import atomic
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
 from unconstrain.recordings.formats.lerobot import ABOUT, ACTION, STATE
+from unconstrain.recordings.steps import runs
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -99,7 +100,7 @@ def _rate(demos: Demonstrations, fps: float | None) -> int:
         return round(fps)
     if demos.time is None:
         raise DataError("these recordings have no time: give fps=, the number of samples a second")
-    steps = np.concatenate([np.diff(demos.time[own]) for own in _episodes(demos)])
+    steps = np.concatenate([np.diff(demos.time[own]) for own in runs(demos.episodes)])
     step = float(np.median(steps)) if len(steps) else 0.0
     even = step > 0 and bool(np.all(np.abs(steps - step) < 0.1 * step))
     if not even or abs(1 / step - round(1 / step)) > 0.02 / step:
@@ -110,16 +111,10 @@ def _rate(demos: Demonstrations, fps: float | None) -> int:
     return round(1 / step)
 
 
-def _episodes(demos: Demonstrations) -> list[NDArray[np.int64]]:
-    """Return the samples of each episode, in order."""
-    order = np.argsort(demos.episodes, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(demos.episodes, minlength=demos.n_episodes))[:-1])
-
-
 def _on_grid(demos: Demonstrations, rate: int) -> Demonstrations:
     """Return demonstrations with times that are multiples of 1 / rate in each episode."""
     X, U, codes, times = [], [], [], []
-    for code, own in enumerate(_episodes(demos)):
+    for code, own in enumerate(runs(demos.episodes)):
         states, actions = demos.states[own], demos.actions[own]
         count = len(own)
         if demos.time is not None:

@@ -84,11 +84,7 @@ def check_read(recording: Recording, motion: Motion, notes: Sequence[Note]) -> N
         It has less than two samples, or all actions are zero.
     """
     if not motion.n_samples:
-        found = {note.kind: note.counts[0] for note in notes if note.file == recording.name and note.counts}
-        raise DataError(
-            f"{recording.shown}: split at {found.get('gap', 0)} gaps and {found.get('speed', 0)} fast steps, no "
-            f"fragment lasts {recording.shortest:g} s; raise gap= or max_speed=, or lower window= or min_duration="
-        )
+        raise DataError(f"{recording.shown}: {_why_empty(recording, notes)}")
     if recording.saves:
         return
     if motion.n_samples < 2:
@@ -96,6 +92,21 @@ def check_read(recording: Recording, motion: Motion, notes: Sequence[Note]) -> N
     if not motion.moves:
         remedy = "the states do not move" if recording.differentiates else "choose other action columns"
         raise DataError(f"all actions of {recording.shown} are zero: {remedy}")
+
+
+def _why_empty(recording: Recording, notes: Sequence[Note]) -> str:
+    found = {note.kind: note.counts[0] for note in notes if note.file == recording.name and note.counts}
+    if "short" in found:
+        return (
+            f"split at {found.get('gap', 0)} gaps and {found.get('speed', 0)} fast steps, no fragment lasts "
+            f"{recording.shortest:g} s; raise gap= or max_speed=, or lower window= or min_duration="
+        )
+    if "pause" in found:
+        return "all of it is at rest, and nothing is left without pauses; leave them in"
+    return (
+        f"in each of its {found.get('empty', 0)} rows a state, an action or a stamp is missing; fill them in, or "
+        "choose other columns"
+    )
 
 
 def _load(recording: Recording, everything: bool, pieces: Sequence[Piece], start: int) -> Loaded:
@@ -112,8 +123,7 @@ def _load(recording: Recording, everything: bool, pieces: Sequence[Piece], start
     if least is not None:
         loaded = leave_out_slow(loaded, least)
     elif everything:
-        U = loaded.samples.actions
-        loaded = replace(loaded, motion=Motion(len(U), bool(np.any(U)), 0.0))
+        loaded = replace(loaded, motion=Motion.of(loaded.samples.actions))
     return replace(loaded, notes=(*loaded.notes, _tally(recording, loaded, pieces, start)))
 
 
@@ -149,7 +159,8 @@ def _tally(recording: Recording, loaded: Loaded, pieces: Sequence[Piece], start:
         begins = int(np.sum(values[1:] != values[:-1])) + _begins(recording, values[:1], start)
         return tally(name, len(groups), begins, None)
     codes, found = number_values(groups)
-    if recording.undivided and not loaded.episodes:
+    # Fragments have names; numbers are those of the blocks that one long episode is cut into.
+    if recording.undivided and not loaded.episodes and np.issubdtype(groups.dtype, np.integer):
         codes, found = np.zeros_like(codes), found[:1]
     if time is None:
         return tally(name, len(groups), len(found), None)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from unconstrain.arrays import NOT_IDEMPOTENT, not_idempotent
 from unconstrain.errors import DataError
 from unconstrain.recordings.formats.base import ColumnKey, Format
-from unconstrain.recordings.table import Cells, Field, describe_kind, is_text, row
+from unconstrain.recordings.table import Cells, Field, describe_kind, is_text
 
 Array = NDArray[np.float64]
 
@@ -60,11 +60,14 @@ class Piece(NamedTuple):
         """Say where in the file a row is."""
         return self.format.place(self.first + (index if self.kept is None else int(self.kept[index])))
 
+    def take(self, chosen: NDArray[np.int64]) -> "Piece":
+        """Return the rows of these indices (M,), which still know where in the file they are."""
+        kept = chosen if self.kept is None else self.kept[chosen]
+        return self._replace(rows=self.rows.take(pa.array(chosen)), kept=kept, whole=self.length)
+
     def without(self, rows: NDArray[np.bool_]) -> "Piece":
         """Return the piece without the rows of a mask (N,)."""
-        return self._replace(
-            rows=self.rows.filter(pa.array(~rows)), kept=np.flatnonzero(~rows), whole=len(rows)
-        )
+        return self.take(np.flatnonzero(~rows))
 
     def missing(self, field: Field, role: str) -> NDArray[np.bool_]:
         """Tell in which rows (N,) a field is empty or no finite number; of times, only where it is empty."""
@@ -278,7 +281,7 @@ def _read_sparse(piece: Piece, columns: Sequence[ColumnKey], width: int) -> Arra
             if len(odd):
                 raise DataError(
                     f"{shown}: column {name!r} holds a list of {lengths[odd[0]]} at "
-                    f"{row(piece.first + int(odd[0]))} where {width} numbers are needed"
+                    f"{piece.place(int(odd[0]))} where {width} numbers are needed"
                 )
             rows, values = lengths > 0, values.flatten()
         cells = Cells(values, shown, f"column {name!r}", piece.place)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from numbers import Real
 
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, show
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Ticks a second."""
@@ -87,7 +87,7 @@ class Preparation:
         for name, words in CHOICES.items():
             word = getattr(self, name)
             if word is not None and not (isinstance(word, str) and word in words):
-                raise DataError(f"{name} must be one of {', '.join(words)}, got {_shown(word)}")
+                raise DataError(f"{name} must be one of {', '.join(words)}, got {show(word)}")
         if self.drop is not None:
             object.__setattr__(self, "drop", _listed(self.drop))
         if self.rate is not None and self.time_unit is not None:
@@ -103,7 +103,7 @@ class Preparation:
             except (TypeError, ValueError, OverflowError):
                 number = math.nan
             if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
-                raise DataError(f"{field.name} must be a positive number, got {_shown(value)}")
+                raise DataError(f"{field.name} must be a positive number, got {show(value)}")
 
     def drops(self, what: str) -> bool:
         """Whether something is left out.
@@ -130,9 +130,5 @@ def _listed(drop: object) -> str | None:
     )
     odd = [word for word in words if word not in DROPPED]
     if odd:
-        raise DataError(f"drop takes {', '.join(DROPPED)}, separated by commas, got {_shown(odd[0])}")
+        raise DataError(f"drop takes {', '.join(DROPPED)}, separated by commas, got {show(odd[0])}")
     return ",".join(word for word in DROPPED if word in words) or None
-
-
-def _shown(value: object) -> str:
-    return f"{' '.join(repr(value).split()):.60}"

@@ -101,6 +101,11 @@ class Recording:
         return not self.roles.action
 
     @property
+    def smooths(self) -> bool:
+        """Whether anything is differentiated over a window: the states, or columns that they are relative to."""
+        return self.differentiates or bool(self.roles.reference)
+
+    @property
     def splits(self) -> bool:
         """Whether samples are prepared by their time: split, resampled, differentiated, or left out by it."""
         if not self.timed:
@@ -108,7 +113,7 @@ class Recording:
         how = self.preparation
         asked = not (how.gap is how.max_speed is how.resample is None)
         by_time = any(how.drops(what) for what in ("duplicates", "short", "pauses"))
-        return self.differentiates or asked or by_time or self.kind.kind == "increment"
+        return self.smooths or asked or by_time or self.kind.kind == "increment"
 
     @property
     def timed(self) -> bool:
@@ -271,7 +276,7 @@ class Recording:
     @property
     def shortest(self) -> float:
         """How long (s) a fragment of a split episode has to last."""
-        window = self.preparation.window if self.differentiates else 0.0
+        window = self.preparation.window if self.smooths else 0.0
         return max(window, self.preparation.min_duration or 0.0)
 
     def keys(self, everything: bool) -> list[ColumnKey]:
@@ -294,19 +299,23 @@ class Recording:
         )
 
     def complete(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
-        """Leave out the rows without a state, an action or a stamp, where that is asked for."""
+        """Leave out the rows without a state, what it is relative to, an action or a stamp, where that is asked for."""
         if not self.preparation.drops("missing"):
             return pieces
         roles = self.roles
-        several = (("state", roles.state), ("action", roles.action))
+        several = (
+            ("state", roles.state),
+            ("relative_to", roles.reference),
+            ("action", roles.action),
+            ("time", () if roles.time is None else (roles.time,)),
+        )
         wanted = [(role, field) for role, fields in several for field in fields]
         complete = []
         for piece in pieces:
             missing = np.zeros(len(piece.rows), dtype=bool)
-            timed = roles.time is not None and roles.time.key in piece.at
-            for role, field in [*wanted, *([("time", roles.time)] if timed else [])]:
-                assert field is not None
-                missing |= piece.missing(field, role)
+            for role, field in wanted:
+                if field.key in piece.at:
+                    missing |= piece.missing(field, role)
             complete.append(piece.without(missing) if missing.any() else piece)
         return complete
 

@@ -64,7 +64,7 @@ def make_grid(time: Array, episodes: Codes, rate: float) -> Grid:
     parts = []
     for code, own in enumerate(runs(episodes)):
         stamps = spread(time[own])
-        count = int(np.floor((stamps[-1] - stamps[0]) * rate * (1 + 1e-9))) + 1
+        count = count_even(float(stamps[-1] - stamps[0]), rate)
         even = stamps[0] + np.arange(count) / rate
         right = np.clip(np.searchsorted(stamps, even, side="left"), 1, max(len(own) - 1, 1))
         left, right = right - 1, np.minimum(right, len(own) - 1)
@@ -73,6 +73,11 @@ def make_grid(time: Array, episodes: Codes, rate: float) -> Grid:
         parts.append(Grid(even, np.full(count, code), own[left], own[right], share))
     names = ("time", "episodes", "before", "after", "share")
     return Grid(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def count_even(seconds: float, rate: float) -> int:
+    """Return how many samples a fragment of this duration has at a rate; rounding does not cost the last one."""
+    return int(np.floor(seconds * rate * (1 + 1e-9))) + 1
 
 
 def spread(stamps: Array) -> Array:

@@ -396,19 +396,22 @@ def open(
             raise DataError("these recordings are open already: give columns and options when opening them")
         return source
     if isinstance(source, Demonstrations):
-        return Recordings(open_demonstrations(source, columns, preparation), columns, preparation)
+        return _of_tables(open_demonstrations(source, columns, preparation), columns, preparation)
     frames = find_frames(source)
     if frames:
-        return Recordings(open_frames(frames, columns, preparation), columns, preparation)
+        return _of_tables(open_frames(frames, columns, preparation), columns, preparation)
     paths, batches = tell_apart(source)
     if paths:
-        tables = open_files(paths, columns, preparation)
-        found = tables.recordings[0].kind
-        if found.found:  # so that other recordings are read alike
-            preparation = replace(preparation, action_is=found.kind)
-        return Recordings(tables, columns, preparation)
+        return _of_tables(open_files(paths, columns, preparation), columns, preparation)
     check_plain(columns, preparation)
     return Recordings(Batches(batches, min_speed=preparation.min_speed), columns, preparation)
+
+
+def _of_tables(tables: Tables, columns: Columns, preparation: Preparation) -> Recordings:
+    found = tables.recordings[0].kind
+    if found.found:  # so that other recordings are read alike
+        preparation = replace(preparation, action_is=found.kind)
+    return Recordings(tables, columns, preparation)
 
 
 def _of(

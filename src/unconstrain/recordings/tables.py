@@ -1,16 +1,16 @@
 """Recordings that lie in files, one after the other, as one source of samples."""
 
+import math
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.blocks import Block, Loaded, Motion
+from unconstrain.recordings.blocks import Array, Block, Loaded, Motion
 from unconstrain.recordings.loading import check_read, read_blocks
 from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.pieces import Piece
@@ -85,7 +85,12 @@ class Tables:
         return X[:HEAD_ROWS], None if U is None else U[:HEAD_ROWS]
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any] | None]:
-        """Read random rows, in order; all where there are no more. Of many row groups only some are read."""
+        """Read random rows, in order; all where there are no more. Of many row groups only some are read.
+
+        Where states are made relative to something, they are prepared for that, and all of them are read.
+        """
+        if any(each.is_relative or each.roles.angle for each in self.recordings):
+            return self._sample_prepared(n_rows, random_state)
         if self.n_rows <= n_rows:
             return _joined([(each, list(each.read_pieces(each.plain_keys()))) for each in self.recordings])
         rng = np.random.default_rng(random_state)
@@ -105,10 +110,25 @@ class Tables:
             for piece in recording.read_pieces(recording.plain_keys(), first, first + size):
                 low, high = np.searchsorted(picked, [at, at + len(piece.rows)])
                 if high > low:
-                    rows = piece.rows.take(pa.array(picked[low:high] - at))
-                    sampled.setdefault(number, []).append(piece._replace(rows=rows))
+                    sampled.setdefault(number, []).append(piece.take(picked[low:high] - at))
                 at += len(piece.rows)
         return _joined([(self.recordings[number], pieces) for number, pieces in sampled.items()])
+
+    def _sample_prepared(self, n_rows: int, random_state: int | None) -> tuple[Array, Array]:
+        rng = np.random.default_rng(random_state)
+        share = min(n_rows / max(self.n_rows, 1), 1.0)
+        X, U = [], []
+        for block in self.blocks(n_rows):
+            samples = block.load().samples
+            count = len(samples.states)
+            picked = np.sort(rng.choice(count, min(math.ceil(share * count), count), replace=False))
+            X.append(samples.states[picked])
+            U.append(samples.actions[picked])
+        states, actions = np.concatenate(X), np.concatenate(U)
+        if len(states) <= n_rows:
+            return states, actions
+        picked = np.sort(rng.choice(len(states), n_rows, replace=False))
+        return states[picked], actions[picked]
 
     def blocks(
         self, batch_rows: int, start: int = 0, stop: int | None = None
@@ -154,15 +174,12 @@ class Tables:
         After each recording it is checked that something of it is left, and moves.
         """
         for recording in self.recordings:
-            total = Motion(0, False, 0.0)
+            total = Motion()
             notes: tuple[Note, ...] = ()
             for block in read_blocks(recording, batch_rows, everything=True):
                 loaded = block.load()
-                own = loaded.motion
-                assert own is not None
-                total = Motion(
-                    total.n_samples + own.n_samples, total.moves or own.moves, max(total.fastest, own.fastest)
-                )
+                assert loaded.motion is not None
+                total += loaded.motion
                 notes = combine((*notes, *loaded.notes))
                 yield loaded
             check_read(recording, total, notes)

@@ -85,8 +85,8 @@ class Clock:
         """
         text = _type_of_text(stamps) if is_text(stamps.filled().type) else None
         ticks, own = _ticks(stamps, text)
-        order = np.argsort(episodes, kind="stable")
-        steps = np.diff(ticks[order])[np.diff(episodes[order]) == 0]
+        _, every, within = _steps(ticks, episodes)
+        steps = every[within]
         if rate is not None and own is None:
             return cls("frames", text, typical_step(steps, rate) / rate, rate)
         first = float(abs(ticks[0])) if len(ticks) else 0.0
@@ -171,9 +171,8 @@ class Clock:
         DataError
             Stamps that do not increase strictly within an episode.
         """
-        order = np.argsort(episodes, kind="stable")
-        steps = np.diff(ticks[order])
-        late = np.flatnonzero((np.diff(episodes[order]) == 0) & ~(steps > 0))
+        order, steps, within = _steps(ticks, episodes)
+        late = np.flatnonzero(within & ~(steps > 0))
         if len(late):
             first = late[np.argmin(order[late + 1])]
             does = "repeats a stamp" if steps[first] == 0 else "goes back"
@@ -190,10 +189,16 @@ class Clock:
 
 def repeated(ticks: NDArray[Any], episodes: Codes) -> NDArray[np.bool_]:
     """Tell which stamps (N,) equal the one before them in the same episode."""
-    order = np.argsort(episodes, kind="stable")
+    order, steps, within = _steps(ticks, episodes)
     again = np.zeros(len(ticks), dtype=bool)
-    again[order[1:]] = (np.diff(episodes[order]) == 0) & (np.diff(ticks[order]) == 0)
+    again[order[1:]] = within & (steps == 0)
     return again
+
+
+def _steps(ticks: NDArray[Any], episodes: Codes) -> tuple[Codes, NDArray[Any], NDArray[np.bool_]]:
+    """Return the order (N,) of stamps episode by episode, the steps (N-1,) then, and which lie within an episode."""
+    order = np.argsort(episodes, kind="stable")
+    return order, np.diff(ticks[order]), np.diff(episodes[order]) == 0
 
 
 def _guess(first: float, step: float) -> tuple[str, bool]:

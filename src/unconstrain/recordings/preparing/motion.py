@@ -19,19 +19,7 @@ Array = NDArray[np.float64]
 
 
 def unwrap_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Count the turns of angles on, and keep the sign of quaternions, episode by episode.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        What was recognised.
-    """
+    """Count the turns of angles on, and keep the sign of quaternions, episode by episode."""
     recording = portion.recording
     if not recording.unwraps:
         return rows, ()
@@ -49,19 +37,7 @@ def unwrap_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 
 def divide_increments(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Make velocities of actions that are steps to the next state.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None: what actions are is noted once for all recordings.
-    """
+    """Make velocities of actions that are steps to the next state."""
     if rows.time is None or portion.recording.kind.kind != "increment":
         return rows, ()
     U = np.empty_like(rows.U)
@@ -71,19 +47,7 @@ def divide_increments(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 
 def resample(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Bring rows to even times, fragment by fragment, so that nothing is interpolated across a gap.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None.
-    """
+    """Bring rows to even times, fragment by fragment, so that nothing is interpolated across a gap."""
     rate = portion.recording.preparation.resample
     if rate is None or rows.time is None or not len(rows):
         return rows, ()
@@ -91,19 +55,7 @@ def resample(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 
 def differentiate_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Make the derivative of the states the actions, where none are given.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None.
-    """
+    """Make the derivative of the states the actions, where none are given."""
     if not (portion.recording.differentiates and len(rows)):
         return rows, ()
     assert rows.time is not None
@@ -114,19 +66,7 @@ def differentiate_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 
 def relate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Take states and actions relative to what the options say.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-        Without the true policy, which is that of the states as they were.
-    tuple of Note
-    """
+    """Take states and actions relative to what the options say."""
     recording = portion.recording
     if not recording.is_relative:
         return rows, ()

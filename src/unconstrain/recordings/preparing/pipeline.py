@@ -19,7 +19,10 @@ from unconstrain.recordings.preparing.splitting import split_rows
 from unconstrain.recordings.preparing.timing import time_rows
 
 Step = Callable[[Portion, Rows], tuple[Rows, Notes]]
-"""Takes rows and returns rows, and what it found; rows with which it has nothing to do it returns as they are."""
+"""Takes a portion and its rows as earlier steps left them; returns rows, and notes of what it found.
+
+Rows with which it has nothing to do it returns as they are. It changes no array: others may hold it.
+"""
 
 STEPS: tuple[Step, ...] = (
     time_rows,

@@ -9,19 +9,7 @@ from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
 
 
 def make_projections(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
-    """Make the projections of contact forces or of flags, where they are not read.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
-        None.
-    """
+    """Make the projections of contact forces or of flags, where they are not read."""
     recording = portion.recording
     if not recording.makes_projections:
         return rows, ()

@@ -13,16 +13,6 @@ def find_rest(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     """Find the rows that are in pauses, and note how many they are.
 
     They are left out at the end, since the forces of a pause still tell what a contact is.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-    tuple of Note
     """
     recording = portion.recording
     if rows.time is None or recording.saves:

@@ -7,28 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.derivative import spans_window
+from unconstrain.recordings.derivative import spans_window, window_samples
 from unconstrain.recordings.gaps import GAP_STEPS, SUSPICIOUS, Fragments, split
-from unconstrain.recordings.notes import Note
+from unconstrain.recordings.notes import Note, count
+from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
 from unconstrain.recordings.recording import Recording
+from unconstrain.recordings.resampling import count_even
 
 Array = NDArray[np.float64]
 
 
 def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     """Split episodes into fragments at gaps and at steps that are too fast, and drop fragments that are too short.
-
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-        Those of the fragments that are left.
-    tuple of Note
 
     Raises
     ------
@@ -39,11 +30,11 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     if rows.time is None or (recording.saves and not recording.splits):
         return rows, ()
     how = recording.preparation
-    needs_neighbours = recording.differentiates or recording.kind.kind == "increment"
+    needs_neighbours = recording.smooths or recording.kind.kind == "increment"
     if needs_neighbours and not how.drops("short"):
         _check_long_enough(recording, rows)
     gap = how.gap
-    if gap is None and not recording.differentiates and how.resample is None:
+    if gap is None and not recording.smooths and how.resample is None:
         gap = math.inf  # given actions do not depend on their neighbours, so a gap does no harm
 
     def long_enough(stamps: Array) -> bool:
@@ -51,7 +42,7 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
         lasts = stamps[-1] - stamps[0] >= (how.min_duration or 0.0) * (1 - 1e-9)
         if not lasts or (len(stamps) < 2 and recording.kind.kind == "increment"):
             return False
-        return not recording.differentiates or spans_window(stamps, how.window)
+        return not recording.smooths or _spans_window(stamps, how)
 
     found = split(
         rows.X, rows.time, rows.codes, gap=gap, max_speed=how.max_speed, long_enough=long_enough,
@@ -63,15 +54,26 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
 def _check_long_enough(recording: Recording, rows: Rows) -> None:
     assert rows.time is not None
-    window = recording.preparation.window
+    how = recording.preparation
     for label, own in zip(rows.episodes.labels, rows.runs(), strict=True):
         stamps = rows.time[own]
-        if len(stamps) < 2 or (recording.differentiates and not spans_window(stamps, window)):
-            samples = f"{len(stamps)} sample{'' if len(stamps) == 1 else 's'}"
+        if len(stamps) < 2 or (recording.smooths and not _spans_window(stamps, how)):
+            samples = count(len(stamps), "sample")
+            resampled, remedy = "", "lower window="
+            if how.resample is not None:
+                resampled, remedy = f" at resample={how.resample:g} Hz", "raise resample="
             raise DataError(
                 f"{recording.shown}: episode {label!r} has {samples} over {stamps[-1] - stamps[0]:.3g} s, too few to "
-                f'differentiate with window={window:g} s; leave it out with drop="short", or lower window='
+                f'differentiate with window={how.window:g} s{resampled}; leave it out with drop="short", or {remedy}'
             )
+
+
+def _spans_window(stamps: Array, how: Preparation) -> bool:
+    """Whether a fragment can be differentiated, as it will be after resampling."""
+    if how.resample is None:
+        return spans_window(stamps, how.window)
+    even = count_even(float(stamps[-1] - stamps[0]), how.resample)
+    return even >= window_samples(1.0 / how.resample, how.window)
 
 
 def _describe(found: Fragments, recording: Recording) -> Notes:

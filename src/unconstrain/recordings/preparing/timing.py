@@ -17,17 +17,6 @@ def time_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 
     Rows that repeat a stamp are left out where that is asked for.
 
-    Parameters
-    ----------
-    portion : Portion
-    rows : Rows
-
-    Returns
-    -------
-    Rows
-        Without time where none is needed.
-    tuple of Note
-
     Raises
     ------
     DataError

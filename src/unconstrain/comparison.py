@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.policies.base import Policy
 from unconstrain.selection import Row, Table, select_policy
@@ -74,8 +75,8 @@ def _is_better(one: Row, other: Row) -> bool:
 
 def compare_risks(
     policy: Policy | None,
-    X: ArrayLike,
-    U: ArrayLike,
+    X: ArrayLike | Demonstrations,
+    U: ArrayLike | None = None,
     groups: ArrayLike | None = None,
     *,
     projections: ArrayLike | None = None,
@@ -87,8 +88,8 @@ def compare_risks(
     ----------
     policy : Policy or None
         What to fit; it is cloned. With None, `select_policy` chooses among its own candidates first.
-    X : array_like of shape (N, n)
-        States.
+    X : array_like of shape (N, n), or Demonstrations
+        States. Demonstrations bring their actions, episodes, known projections and noise.
     U : array_like of shape (N, d)
         Actions.
     groups : array_like of shape (N,), optional

@@ -226,7 +226,7 @@ def select_policy(
         Policies in a list are named after themselves, in a dict by their keys; "auto" stands for those that
         `candidates(n, d)` makes. They are cloned, never changed.
     X : array_like of shape (N, n), or Demonstrations
-        States. Demonstrations bring their actions, episodes and known projections.
+        States. Demonstrations bring their actions, episodes, known projections and noise.
     U : array_like of shape (N, d)
         Actions.
     groups : array_like of shape (N,), optional
@@ -262,10 +262,16 @@ def select_policy(
     """
     import joblib
 
+    noise = X.noise if isinstance(X, Demonstrations) else None
     states, U, groups, projections = unpack_demonstrations(X, U, groups, projections)
     X, U = check_samples(ParametricPolicy(), states, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
     named = _name_candidates(candidates, X.shape[1], actions.shape[1])
+    if noise is not None:
+        named = {
+            name: clone(policy).set_params(noise=noise) if policy.noise is None else policy
+            for name, policy in named.items()
+        }
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
         check_lets_through(projections, actions)

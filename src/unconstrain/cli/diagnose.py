@@ -60,7 +60,7 @@ def diagnose(
     recordings.describe(demos)
     with working("fitting") as report:
         policy = model.build()
-        policy.fit(demos.states, demos.actions, groups=demos.folds(folds), projections=demos.projections)
+        policy.fit(demos, groups=demos.folds(folds))
         report("diagnosing")
         found = identifiability(policy, demos, threshold=threshold)
         text = found.describe(demos.state_names, demos.action_names, most)

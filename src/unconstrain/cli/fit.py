@@ -141,10 +141,8 @@ def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) ->
         policy = None if model.is_chosen else model.build()
         return compare_risks(
             policy,
-            demos.states,
-            demos.actions,
-            demos.folds(folds),
-            projections=demos.projections,
+            demos,
+            groups=demos.folds(folds),
             progress=progress,
         )
 

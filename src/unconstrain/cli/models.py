@@ -34,14 +34,17 @@ class Model:
     centers: str | None = None
     n_centers: int | None = None
     width: float | None = None
+    noise: float | None = None
 
     def __post_init__(self) -> None:
         placed = list(self._placed())
         if self.name == "linear" and placed:
             raise PolicyError(f"the linear model has no centres: leave out {placed[0]}=")
-        if self.is_chosen and (placed or self.alpha != "cv" or self.risk != "adaptive"):
+        if self.is_chosen and (
+            placed or self.alpha != "cv" or self.risk != "adaptive" or self.noise is not None
+        ):
             raise PolicyError(
-                "--model auto makes its own choices: leave out risk=, alpha=, centers=, n_centers= and width="
+                "--model auto makes its own choices: leave out risk=, alpha=, noise=, centers=, n_centers= and width="
             )
 
     @property
@@ -55,11 +58,12 @@ class Model:
         from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 
         placed = self._placed()
+        shared: dict[str, Any] = {"risk": self.risk, "alpha": self.alpha, "noise": self.noise}
         if self.name == "linear":
-            return ParametricPolicy(risk=self.risk, alpha=self.alpha)
+            return ParametricPolicy(**shared)
         if self.name == "rbf":
-            return ParametricPolicy(NormalizedRBF(**placed), risk=self.risk, alpha=self.alpha)
-        return LocallyLinearPolicy(**placed, risk=self.risk, alpha=self.alpha)
+            return ParametricPolicy(NormalizedRBF(**placed), **shared)
+        return LocallyLinearPolicy(**placed, **shared)
 
     def _placed(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in PLACED if getattr(self, name) is not None}
@@ -92,6 +96,13 @@ model = gathered(
             default="cv",
             show_default=True,
             help='Weight decay λ: a number, or "cv" to choose it by cross-validation.',
+            section="Model",
+        ),
+        option(
+            "--noise",
+            type=Number(zero=True),
+            help="Standard deviation of the actions' noise, in their unit. By default, of actions that are differentiated, "
+            "what the states' noise leaves.",
             section="Model",
         ),
         option(

@@ -57,6 +57,7 @@ class Policy(RegressorMixin, BaseEstimator):
 
     risk: str
     alpha: float | str
+    noise: float | None
     model_: Model
     solution_: Solution
     accumulator_: Accumulator
@@ -101,8 +102,8 @@ class Policy(RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X : array_like of shape (N, n), or Demonstrations
-            States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, and the
-            projections they know, unless these are given.
+            States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, the
+            projections they know, and the noise of actions that were differentiated, unless these are given.
         y : array_like of shape (N, d) or (N,)
             Actions.
         groups : array_like of shape (N,), optional
@@ -127,7 +128,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         fresh = copy(self)
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-        accumulator = fresh.start(samples)
+        accumulator = fresh.start(samples, X.noise if isinstance(X, Demonstrations) else None)
         if self.risk == "adaptive":
             accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
         else:
@@ -189,13 +190,16 @@ class Policy(RegressorMixin, BaseEstimator):
             )
         return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
 
-    def start(self, samples: Samples) -> Accumulator:
+    def start(self, samples: Samples, noise: float | None = None) -> Accumulator:
         """Make an accumulator for this policy's options, its model placed by some samples.
 
         Parameters
         ----------
         samples : Samples
             Checked. Those without motion or a known projection do not count in placing.
+        noise : float, optional
+            Standard deviation of the actions' noise, where it is known of these recordings; the policy's own option
+            takes its place.
 
         Returns
         -------
@@ -220,7 +224,8 @@ class Policy(RegressorMixin, BaseEstimator):
             raise DataError(NO_DIRECTION)
         weights = np.ones(len(X)) if weights is None else weights
         model = self.place(X[counted], U.shape[1], weights[counted])
-        return Accumulator(model, self.risk, self.alpha)
+        known = noise if self.noise is None else self.noise
+        return Accumulator(model, self.risk, self.alpha, noise=float(known or 0.0) ** 2)
 
     def resume(self) -> Accumulator:
         """Copy the sums that this policy was solved from, to add to them.
@@ -610,12 +615,14 @@ class Policy(RegressorMixin, BaseEstimator):
         return left
 
     def check_options(self) -> None:
-        """Raise `PolicyError` for a risk or a weight decay that is none."""
+        """Raise `PolicyError` for a risk, a weight decay or a noise that is none."""
         check_choice(self.risk, "risk", RISKS)
         if isinstance(self.alpha, str):
             check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
         else:
             check_number(self.alpha, "alpha", positive=False)
+        if self.noise is not None:
+            check_number(self.noise, "noise", positive=False)
 
     @property
     def n_actions_(self) -> int:

@@ -42,6 +42,8 @@ class LocallyLinearPolicy(Policy):
         As for `ParametricPolicy`.
     alpha : "cv" or float
         As for `ParametricPolicy`; one λ for all models.
+    noise : float, optional
+        As for `ParametricPolicy`.
     prior : {"global", "zero"}
         What each model decays to: the policy of the same features fitted to all data together, or zero, as published.
     random_state : int, optional
@@ -74,6 +76,7 @@ class LocallyLinearPolicy(Policy):
         n_centers: int = 30,
         risk: str = "adaptive",
         alpha: float | str = "cv",
+        noise: float | None = None,
         prior: str = "global",
         random_state: int | None = 0,
     ):
@@ -84,6 +87,7 @@ class LocallyLinearPolicy(Policy):
         self.n_centers = n_centers
         self.risk = risk
         self.alpha = alpha
+        self.noise = noise
         self.prior = prior
         self.random_state = random_state
 

@@ -34,6 +34,10 @@ class ParametricPolicy(Policy):
         The weight decay λ, a pure number: relative to what the samples say on the mean of the parameters, whatever the
         units (`fitting.decay`). Intercepts hardly decay. "cv" chooses it by held-out risk among 25 values over five
         folds of episodes.
+    noise : float, optional
+        Standard deviation of the actions' noise, in their unit, where it is known; by default what `Demonstrations` say
+        of velocities that were differentiated. With "adaptive" the noise that is inferred is not below it, with
+        "corrected" that much is taken away; the other risks do not look at it.
 
     Attributes
     ----------
@@ -72,10 +76,11 @@ class ParametricPolicy(Policy):
     True
     """
 
-    def __init__(self, features: Any = None, *, risk: str = "adaptive", alpha: float | str = "cv"):
+    def __init__(self, features: Any = None, *, risk: str = "adaptive", alpha: float | str = "cv", noise: float | None = None):
         self.features = features
         self.risk = risk
         self.alpha = alpha
+        self.noise = noise
 
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
         """Fit the features.

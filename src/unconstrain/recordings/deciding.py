@@ -1,4 +1,4 @@
-"""What the actions of recordings are is decided once for all of them, by the first."""
+"""What the actions of recordings are, and how long states are smoothed, is decided once for all of them, by the first."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,7 +10,13 @@ from unconstrain.recordings.actions import ActionKind, find_kind
 from unconstrain.recordings.blocks import number_values
 from unconstrain.recordings.columns import DIFFERENTIATE
 from unconstrain.recordings.pieces import Piece, read_numbers
+from unconstrain.recordings.preparing.motion import resample, unwrap_states
+from unconstrain.recordings.preparing.reading import read
+from unconstrain.recordings.preparing.rows import Portion, Rows
+from unconstrain.recordings.preparing.splitting import split_rows
+from unconstrain.recordings.preparing.timing import time_rows
 from unconstrain.recordings.recording import FIRST_ROWS, Recording, distinct
+from unconstrain.recordings.smoothing import find_smoothing
 
 
 def decide_kind(recordings: Sequence[Recording], given: str | None) -> tuple[Recording, ...]:
@@ -85,3 +91,62 @@ def _find(recording: Recording) -> str:
     elif recording.timed:
         seconds = recording.count_time(codes)[order]
     return find_kind(X[order], U[order], codes[order], seconds)
+
+
+def decide_smoothing(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Find over how long states are smoothed, and their noise: by the first rows, which may be of several recordings.
+
+    They share one window, so that one noise holds for all velocities. By rows of their own, short recordings could
+    hardly tell it.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    tuple of Recording
+        What cannot be read stays as it is: that is for whoever reads all of it to say.
+    """
+    smoothed = [each for each in recordings if each.smooths and each.timed]
+    if not smoothed:
+        return tuple(recordings)
+    parts: list[Rows] = []
+    left = FIRST_ROWS
+    for recording in smoothed:
+        if left <= 0:
+            break
+        try:
+            rows = _prepare_first(recording, left)
+        except DataError:
+            return tuple(recordings)
+        if len(rows):
+            parts.append(rows)
+        left -= len(rows)
+    if not parts:
+        return tuple(recordings)
+    X = np.concatenate([rows.X for rows in parts])
+    time = np.concatenate([rows.time for rows in parts if rows.time is not None])
+    before = np.cumsum([0, *(len(rows.origins) for rows in parts)])
+    codes = np.concatenate([rows.codes + n for rows, n in zip(parts, before, strict=False)])
+    found = find_smoothing(X, time, codes, window=smoothed[0].preparation.window)
+    return tuple(replace(each, smoothing=found) if each.smooths else each for each in recordings)
+
+
+def _prepare_first(recording: Recording, n_rows: int) -> Rows:
+    """Prepare the first rows until they would be differentiated; episodes that are too short to tell are left out."""
+    how = recording.preparation
+    drop = "short" if how.drop is None else f"{how.drop},short"
+    probe = replace(recording, preparation=replace(how, drop=drop, window=None, min_duration=None))
+    pieces: list[Piece] = []
+    count = 0
+    for piece in probe.read_pieces(probe.keys(everything=False)):
+        pieces.append(piece.slice(0, n_rows - count))
+        count += len(pieces[-1].rows)
+        if count >= n_rows:
+            break
+    portion = Portion(probe, pieces, 0, everything=False)
+    rows, _ = read(portion)
+    for step in (time_rows, unwrap_states, split_rows, resample):
+        rows, _ = step(portion, rows)
+    return rows

@@ -12,7 +12,7 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.assembling import make_recording
 from unconstrain.recordings.batches import FORMS
 from unconstrain.recordings.columns import GOAL, START, Columns
-from unconstrain.recordings.deciding import decide_kind
+from unconstrain.recordings.deciding import decide_kind, decide_smoothing
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.files import short_names
 from unconstrain.recordings.formats.frame import Frame, is_frame
@@ -175,4 +175,4 @@ def _as_tables(recordings: Sequence[Recording], preparation: Preparation) -> Tab
     Tables(tuple(recordings)).check_alike()
     first = recordings[0]
     led = [first, *(replace(each, leader=first) for each in recordings[1:])]
-    return Tables(decide_kind(led, preparation.action_is))
+    return Tables(decide_smoothing(decide_kind(led, preparation.action_is)))

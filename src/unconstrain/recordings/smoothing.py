@@ -16,7 +16,7 @@ Lepski, On a problem of adaptive estimation in Gaussian white noise, Theory of P
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cache
 from math import comb
 
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.recordings.derivative import Array, even_grid, window_samples
+from unconstrain.recordings.notes import Note
 from unconstrain.recordings.steps import LONG_STEPS, comes_in_bursts, runs
 
 FALLING = 0.7
@@ -80,6 +81,31 @@ class Smoothing:
     error: float
 
 
+def describe_smoothing(found: Smoothing | None, given: float | None) -> tuple[Note, ...]:
+    """Note over how long states are smoothed, and how sure velocities are then.
+
+    Parameters
+    ----------
+    found : Smoothing or None
+    given : float or None
+        The window, where it was not found but given.
+
+    Returns
+    -------
+    tuple of Note
+        None where the window was given and nothing was found.
+    """
+    if found is None:
+        text = "the episodes are too short to find their noise, so velocities are those of the fewest samples; window= says"
+        return () if given is not None else (Note("smoothing", "", f"{text} over how long to smooth"),)
+    noise = f"the states' noise is about {found.state_noise:.2g}"
+    unsure = f"velocities are uncertain by about {found.error:.2g} (noise alone: {found.velocity_noise:.2g})"
+    if given is not None:
+        return (Note("smoothing", "", f"{noise}, so over window={given:g} s {unsure}"),)
+    text = f"{noise}, so they are smoothed over {found.window:.3g} s and {unsure}; window= overrules that"
+    return (Note("smoothing", "", text),)
+
+
 @dataclass(frozen=True)
 class _Stretch:
     """States (N, n) at even steps (s)."""
@@ -116,7 +142,12 @@ def find_smoothing(
     Smoothing or None
         None where no episode has the samples to tell.
     """
-    X, t = np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
+        found = _find(np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64), episodes, window)
+    return found if found is not None and np.isfinite([*astuple(found)]).all() else None
+
+
+def _find(X: Array, t: Array, episodes: ArrayLike | None, window: float | None) -> Smoothing | None:
     codes = np.zeros(len(X), dtype=np.int64) if episodes is None else np.asarray(episodes, dtype=np.int64)
     stretches = [part for own in runs(codes) for part in _stretches(X[own], t[own])]
     if not stretches:

@@ -38,6 +38,8 @@ class Declared:
         choice of what to learn from; a file may hold them all.
     state_names, action_names, episode_labels, notes : tuple of str, optional
         As `Demonstrations` has them.
+    noise : float, optional
+        As `Demonstrations` has it.
     """
 
     columns: Columns
@@ -50,6 +52,7 @@ class Declared:
     action_names: tuple[str, ...] | None = None
     episode_labels: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    noise: float | None = None
 
 
 def note_guesses(guesses: Iterable[str]) -> dict[bytes, bytes] | None:

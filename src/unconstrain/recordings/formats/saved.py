@@ -1,6 +1,7 @@
 """What this package wrote itself: archives of demonstrations, and demonstrations that are in memory still."""
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -194,6 +195,10 @@ def declare(about: Any, shown: str) -> Declared:
         force = roles.get("forces")
         projections = roles.get("projections")
         columns = Columns(state, action, single[0], episode)  # type: ignore[arg-type]
+        noise = about.get("noise")
+        noise = None if noise is None else float(noise)
+        if noise is not None and not 0 <= noise < math.inf:
+            raise ValueError("the noise is none")
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations") from error
     if newer:
@@ -209,4 +214,5 @@ def declare(about: Any, shown: str) -> Declared:
         action_names=names["action_names"],
         episode_labels=names["episode_labels"],
         notes=names["notes"],
+        noise=noise,
     )

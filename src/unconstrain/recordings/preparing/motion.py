@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from unconstrain.recordings.actions import per_second
 from unconstrain.recordings.angles import unwrap
-from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.derivative import differentiate
 from unconstrain.recordings.notes import Note
-from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
+from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.relative import describe, end_of, moving_centre
 from unconstrain.recordings.resampling import make_grid
 
@@ -61,7 +60,8 @@ def differentiate_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     assert rows.time is not None
     U = np.empty_like(rows.U)
     for own in rows.runs():
-        U[own] = differentiate(rows.X[own], rows.time[own], window=portion.recording.preparation.window)
+        time = rows.time[own]
+        U[own] = differentiate(rows.X[own], time, window=portion.recording.fit_window(time))
     return replace(rows, U=U), ()
 
 
@@ -70,20 +70,20 @@ def relate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     recording = portion.recording
     if not recording.is_relative:
         return rows, ()
-    columns, how = recording.columns, recording.preparation
     X, U = np.empty_like(rows.X), np.empty_like(rows.U)
     for own in rows.runs():
-        X[own], U[own] = _relate(rows.take(own), columns, how)
-    note = Note("relative", recording.name, describe(columns.relative_to, how.moving_centre))
+        X[own], U[own] = _relate(rows.take(own), recording)
+    note = Note("relative", recording.name, describe(recording.columns.relative_to, recording.preparation.moving_centre))
     return replace(rows, X=X, U=U, policy=None), (note,)
 
 
-def _relate(episode: Rows, columns: Columns, how: Preparation) -> tuple[Array, Array]:
+def _relate(episode: Rows, recording: Recording) -> tuple[Array, Array]:
     """Return the states and actions of one episode relative to what the options say."""
+    columns, how = recording.columns, recording.preparation
     X, U, time, reference = episode.X, episode.U, episode.time, episode.reference
     if reference is not None:
         assert time is not None
-        X, U = X - reference, U - differentiate(reference, time, window=how.window)
+        X, U = X - reference, U - differentiate(reference, time, window=recording.fit_window(time))
     elif columns.relative_to is not None:
         X = X - end_of(X, str(columns.relative_to))
     if how.moving_centre is not None:

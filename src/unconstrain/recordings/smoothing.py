@@ -47,6 +47,11 @@ SLACK, SHORTEST = 1.2, 0.6
 """Instead of the window with the least error the shortest is taken whose error is at most so many times larger, if it is at
 least this share as long: a policy learnt from velocities averages their noise, but what is blunted stays so."""
 
+ROUGH, AS_ROUGH, TWICE, WHITE = 3.0, 1.1, 2.0, 0.3
+"""Where D rises at once, but at most to `TWICE` of what it was, and is back before `ROUGH` times the window, it is a roughness
+that the samples do not resolve, such as that of a tracker or of a trembling hand, and counts as noise; if no more than the
+share `WHITE` of it is white noise."""
+
 ROUNDING = 1e-6
 """An error of velocities that is a smaller share of them does not count."""
 
@@ -73,12 +78,15 @@ class Smoothing:
         times larger next to the ends of an episode.
     error : float
         The same with what smoothing blunts.
+    is_exact : bool
+        Whether that noise is but rounding.
     """
 
     window: float
     state_noise: float
     velocity_noise: float
     error: float
+    is_exact: bool
 
 
 def describe_smoothing(found: Smoothing | None, given: float | None) -> tuple[Note, ...]:
@@ -95,9 +103,10 @@ def describe_smoothing(found: Smoothing | None, given: float | None) -> tuple[No
     tuple of Note
         None where the window was given and nothing was found.
     """
-    if found is None:
-        text = "the episodes are too short to find their noise, so velocities are those of the fewest samples; window= says"
-        return () if given is not None else (Note("smoothing", "", f"{text} over how long to smooth"),)
+    if found is None or found.is_exact:
+        what = "the states show no noise" if found else "the episodes are too short to find the states' noise"
+        text = f"{what}, so velocities are those of the fewest samples; window= smooths states over as many seconds"
+        return () if given is not None else (Note("smoothing", "", text),)
     noise = f"the states' noise is about {found.state_noise:.2g}"
     unsure = f"velocities are uncertain by about {found.error:.2g} (noise alone: {found.velocity_noise:.2g})"
     if given is not None:
@@ -155,17 +164,22 @@ def _find(X: Array, t: Array, episodes: ArrayLike | None, window: float | None) 
     finest = min(part.step for part in stretches)
     least = max((_between_bursts(np.diff(t[own])) for own in runs(codes)), default=0.0)
     tried = [2 * finest * half for half in _halves(stretches, finest)]
-    differing, gains = [], []
-    rises = False
+    differing: list[float] = []
+    gains: list[float] = []
+    rises, rough = False, 0.0
     for w in tried:
         D, gain = _differ(stretches, w)
         differing.append(D)
         gains.append(gain)
-        if len(tried) > 1 and w >= 8 * finest * (1 - 1e-9):
-            before = _at(w / 2, tried, differing)
-            rises = D > FALLING * before
-            if rises:
-                break
+        if w < 8 * finest * (1 - 1e-9) or w <= rough:
+            continue
+        rises = D > FALLING * _at(w / 2, tried, differing)
+        if rises and not rough and w < 12 * finest * (1 - 1e-9):
+            rough = _end_of_roughness(stretches, [each for each in tried if each <= ROUGH * w], *_differ(stretches, tried[1]))
+            if rough:
+                continue
+        if rises:
+            break
     windows, D, K = np.array(tried[: len(differing)]), np.array(differing), np.array(gains)
     reference = windows[-1] / 2 if rises else windows[-1]
     variance = _at(reference, windows, D / K)
@@ -178,16 +192,32 @@ def _find(X: Array, t: Array, episodes: ArrayLike | None, window: float | None) 
         bias[windows <= reference * (1 + 1e-9)] = 0.0
     left = variance * np.array([_gain(stretches, w) for w in windows])
     errors = bias + left
+    exact = ROUNDING**2 * _mean_square(stretches, windows[0])
     if window is None:
-        exact = ROUNDING**2 * _mean_square(stretches, windows[0])
         near = (errors <= SLACK**2 * errors.min()) & (windows >= SHORTEST * windows[np.argmin(errors)])
         window = max(float(windows[np.argmax(near | (errors <= exact))]), least)
     blunted = _at(window, windows, bias)
     n = X.shape[1]
     noise = variance * _gain(stretches, window)
     return Smoothing(
-        window, float(np.sqrt(variance / n)), float(np.sqrt(noise / n)), float(np.sqrt((noise + blunted) / n))
+        window,
+        state_noise=float(np.sqrt(variance / n)),
+        velocity_noise=float(np.sqrt(noise / n)),
+        error=float(np.sqrt((noise + blunted) / n)),
+        is_exact=bool(variance * _gain(stretches, windows[0]) <= exact),
     )
+
+
+def _end_of_roughness(stretches: Sequence[_Stretch], tried: Sequence[float], finest: float, gain: float) -> float:
+    """Return the longest window at which slopes differ no more than at the finest, where in between they do a little.
+
+    Of a motion that is sampled finely enough they differ ever more, and white noise shows between neighbours.
+    """
+    if gain * _between_neighbours(stretches) > WHITE * finest:
+        return 0.0
+    differing = [_differ(stretches, w)[0] for w in tried[2:]]
+    back = [w for w, D in zip(tried[2:], differing, strict=True) if D <= AS_ROUGH * finest]
+    return back[-1] if back and max(differing) <= TWICE * finest else 0.0
 
 
 def _stretches(X: Array, t: Array) -> list[_Stretch]:

@@ -1,4 +1,7 @@
-"""How well velocities are found whose truth is known: `python -m benchmarks.velocities` prints the table of docs/velocities.md."""
+"""How well velocities are found whose truth is known.
+
+`python -m benchmarks.velocities` prints the table of docs/velocities.md.
+"""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -96,7 +99,9 @@ def _row(signal: str, rate: int, noise: str, X: np.ndarray, V: np.ndarray, t: np
 
 
 def main() -> None:
-    print("| signal | Hz | noise | window found | best | error over 0.2 s | as found | best | as found / best |")
+    print(
+        "| signal | Hz | noise | window found | best | error over 0.2 s | as found | best | as found / best |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     ratios = []
     for row in rows():
@@ -106,7 +111,9 @@ def main() -> None:
             f"| {row.error_found:.2%} | {row.error_best:.2%} | {ratios[-1]:.2f} |"
         )
     within = np.mean(np.array(ratios) <= 1.3)
-    print(f"\nwithin 1.3 times the best: {within:.0%} of {len(ratios)} rows; the worst {max(ratios):.2f} times")
+    print(
+        f"\nwithin 1.3 times the best: {within:.0%} of {len(ratios)} rows; the worst {max(ratios):.2f} times"
+    )
 
 
 if __name__ == "__main__":

@@ -349,7 +349,9 @@ class Demonstrations:
 
         known = [(each.noise, len(each)) for each in several if each.noise is not None]
         if 0 < len(known) < len(several):
-            notes.append(f"left out noise, which {len(several) - len(known)} of {len(several)} demonstrations do not have")
+            notes.append(
+                f"left out noise, which {len(several) - len(known)} of {len(several)} demonstrations do not have"
+            )
         squares, counts = np.array(known).reshape(-1, 2).T ** [[2], [1]]
 
         labels: dict[str, None] = {}  # an ordered set

@@ -74,7 +74,11 @@ MOVING = "t,x\n" + "".join(f"{i / 50},{i}\n" for i in range(20))
         ("t,x\n0,1\n2,2\n1,3\n", XT, r"time in column 't' goes back at line 4"),
         ("t,x\n0,1\nlater,2\n", XT, r"column 't' holds 'later' at line 3"),
         ("t,x\n0,1\n,2\n", XT, r"column 't' is empty at line 3"),
-        ("t,x\n0,1\n1,2\n", XT, r"episode 'a' has 2 samples over 1 s, too few to differentiate; leave it out"),
+        (
+            "t,x\n0,1\n1,2\n",
+            XT,
+            r"episode 'a' has 2 samples over 1 s, too few to differentiate; leave it out",
+        ),
         ("t,x\n0,1\n", XT, r"episode 'a' has 1 sample over 0 s, too few"),
         (MOVING, XT | {"window": 2}, r"episode 'a' has 20 samples over 0.38 s, too few .* window=2 s"),
         (

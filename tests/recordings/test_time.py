@@ -45,7 +45,9 @@ def test_the_size_of_an_epoch_decides(tmp_path, step, unit, ticks):
     demos = uc.load(path, state="x", time="t", window=10 * step)
     assert demos.time[-1] == pytest.approx(199 * step, rel=1e-3)
     assert read(demos).endswith(f"time in {unit}")
-    assert all("noise" in note for note in demos.notes[:-1])  # that of stamps rounded to the precision of a float
+    assert all(
+        "noise" in note for note in demos.notes[:-1]
+    )  # that of stamps rounded to the precision of a float
 
 
 @pytest.mark.parametrize(

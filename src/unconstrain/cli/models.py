@@ -101,8 +101,8 @@ model = gathered(
         option(
             "--noise",
             type=Number(zero=True),
-            help="Standard deviation of the actions' noise, in their unit. By default, of actions that are differentiated, "
-            "what the states' noise leaves.",
+            help="Standard deviation of the actions' noise, in their unit. By default, of actions that are "
+            "differentiated, what the states' noise leaves.",
             section="Model",
         ),
         option(

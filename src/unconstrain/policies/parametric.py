@@ -76,7 +76,14 @@ class ParametricPolicy(Policy):
     True
     """
 
-    def __init__(self, features: Any = None, *, risk: str = "adaptive", alpha: float | str = "cv", noise: float | None = None):
+    def __init__(
+        self,
+        features: Any = None,
+        *,
+        risk: str = "adaptive",
+        alpha: float | str = "cv",
+        noise: float | None = None,
+    ):
         self.features = features
         self.risk = risk
         self.alpha = alpha

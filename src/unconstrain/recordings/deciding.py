@@ -1,4 +1,4 @@
-"""What the actions of recordings are, and how long states are smoothed, is decided once for all of them, by the first."""
+"""What actions are, and over how long states are smoothed, is decided once for all recordings, by the first."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 KINDS = (
-    "saved", "guess", "time", "burst", "actions", "smoothing", "empty", "repeated", "angle", "gap", "speed", "short", "jump",
-    "pause", "missing", "slow", "relative", "read",
+    "saved", "guess", "time", "burst", "actions", "smoothing", "empty", "repeated", "angle", "gap", "speed", "short",
+    "jump", "pause", "missing", "slow", "relative", "read",
 )  # fmt: skip
 """In the order in which notes on one file are given; a new finding adds a line of its own here."""
 

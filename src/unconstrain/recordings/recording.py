@@ -119,7 +119,7 @@ class Recording:
         return 2 * self.step if self.smoothing is None else self.smoothing.window
 
     def fit_window(self, stamps: NDArray[np.float64]) -> float:
-        """Return over how long (s) one episode with these stamps (N,) is smoothed: one that was found may be too long."""
+        """Return over how long (s) an episode with these stamps (N,) is smoothed: what was found may be too long."""
         return min(self.window, longest_window(stamps)) if self.preparation.window is None else self.window
 
     @property

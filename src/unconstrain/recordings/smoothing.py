@@ -7,12 +7,12 @@ over the same window have far less bias, and slopes that differ by
     D(w) = B(w) + κ V(w),        κ = 21/4 for long windows.
 
 So D falls with w as long as it is noise, and rises once the motion is blunted. Noise is read off where it is about to
-rise, at the time scale of the window itself. Thus it need not be white: that of quantised positions, which stand still and
-jump, or of filtered ones hardly shows between neighbouring samples. The least of `B + V` is what remains to be found.
+rise, at the time scale of the window itself. Thus it need not be white: that of quantised positions, which stand still
+and jump, or of filtered ones hardly shows between neighbouring samples. The least of `B + V` remains to be found.
 
 References
 ----------
-Lepski, On a problem of adaptive estimation in Gaussian white noise, Theory of Probability and its Applications 35, 1990.
+Lepski, On a problem of adaptive estimation in Gaussian white noise, Theory of Probability and its Applications, 1990.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from unconstrain.recordings.notes import Note
 from unconstrain.recordings.steps import LONG_STEPS, comes_in_bursts, runs
 
 FALLING = 0.7
-"""Over twice the window, D falls to less than this share as long as it is noise. Even that of a random walk falls to half."""
+"""Over twice the window, D falls to less than this share where it is noise. Even that of a random walk falls to half."""
 
 STEP = 2**0.25
 """From one window tried to the next."""
@@ -44,19 +44,20 @@ KEPT, OF_NORMAL = 0.75, 0.3684
 normal numbers of variance 1."""
 
 SLACK, SHORTEST = 1.2, 0.6
-"""Instead of the window with the least error the shortest is taken whose error is at most so many times larger, if it is at
-least this share as long: a policy learnt from velocities averages their noise, but what is blunted stays so."""
+"""Instead of the window with the least error the shortest is taken whose error is at most so many times larger, if it
+is at least this share as long: a policy learnt from velocities averages their noise, but what is blunted stays so."""
 
 ROUGH, AS_ROUGH, TWICE, WHITE = 3.0, 1.1, 2.0, 0.3
-"""Where D rises at once, but at most to `TWICE` of what it was, and is back before `ROUGH` times the window, it is a roughness
-that the samples do not resolve, such as that of a tracker or of a trembling hand, and counts as noise; if no more than the
-share `WHITE` of it is white noise."""
+"""Where D rises at once, but at most to `TWICE` of what it was, and is back before `ROUGH` times the window, it is a
+roughness that the samples do not resolve, such as that of a tracker or of a trembling hand, and counts as noise; if no
+more than the share `WHITE` of it is white noise."""
 
 ROUNDING = 1e-6
 """An error of velocities that is a smaller share of them does not count."""
 
 JUMP, ALONE = 4.0, 5.0
-"""A step is no motion that is so many times longer than all but 1 % of them, and than those a little before and after."""
+"""A step is no motion that is so many times longer than all but 1 % of them, and than those a little before and after.
+"""
 
 BURSTS = 2.5
 """Of the steps between bursts of stamps, at least, a window has to hold: within a burst stamps tell no speed."""
@@ -71,8 +72,8 @@ class Smoothing:
     window : float
         Seconds from its first to its last sample.
     state_noise : float
-        Standard deviation of the states' noise, root mean square over the states, in their unit. Where noise is not white,
-        that of white noise which disturbs slopes over this window as much.
+        Standard deviation of the states' noise, root mean square over the states, in their unit. Where noise is not
+        white, that of white noise which disturbs slopes over this window as much.
     velocity_noise : float
         What is left of it in each velocity, in [units of the states] / s. It is correlated over the window, and several
         times larger next to the ends of an episode.
@@ -152,7 +153,9 @@ def find_smoothing(
         None where no episode has the samples to tell.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
-        found = _find(np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64), episodes, window)
+        found = _find(
+            np.asarray(states, dtype=np.float64), np.asarray(time, dtype=np.float64), episodes, window
+        )
     return found if found is not None and np.isfinite([*astuple(found)]).all() else None
 
 
@@ -162,62 +165,77 @@ def _find(X: Array, t: Array, episodes: ArrayLike | None, window: float | None) 
     if not stretches:
         return None
     finest = min(part.step for part in stretches)
-    least = max((_between_bursts(np.diff(t[own])) for own in runs(codes)), default=0.0)
-    tried = [2 * finest * half for half in _halves(stretches, finest)]
-    differing: list[float] = []
-    gains: list[float] = []
-    rises, rough = False, 0.0
-    for w in tried:
-        D, gain = _differ(stretches, w)
-        differing.append(D)
-        gains.append(gain)
-        if w < 8 * finest * (1 - 1e-9) or w <= rough:
-            continue
-        rises = D > FALLING * _at(w / 2, tried, differing)
-        if rises and not rough and w < 12 * finest * (1 - 1e-9):
-            rough = _end_of_roughness(stretches, [each for each in tried if each <= ROUGH * w], *_differ(stretches, tried[1]))
-            if rough:
-                continue
-        if rises:
-            break
-    windows, D, K = np.array(tried[: len(differing)]), np.array(differing), np.array(gains)
+    windows, D, K, rises = _differ_ever_longer(stretches, finest)
     reference = windows[-1] / 2 if rises else windows[-1]
     variance = _at(reference, windows, D / K)
-    # With a few samples more it might rise.
-    at_once = windows[-1] < (12 if rises else 8) * finest * (1 - 1e-9)
-    if at_once:
+    # Where D rises at once, or with a few samples more might have, noise does not show in it.
+    hidden = windows[-1] < (12 if rises else 8) * finest * (1 - 1e-9)
+    if hidden:
         variance = min(variance, _between_neighbours(stretches))
     bias = np.maximum(D - variance * K, 0.0)
-    if not at_once:  # noise says more of the difference there than any bias, so that is known from beyond only
+    if not hidden:  # up to there D is noise, and a bias is not to be told from it
         bias[windows <= reference * (1 + 1e-9)] = 0.0
     left = variance * np.array([_gain(stretches, w) for w in windows])
-    errors = bias + left
     exact = ROUNDING**2 * _mean_square(stretches, windows[0])
     if window is None:
+        errors = bias + left
         near = (errors <= SLACK**2 * errors.min()) & (windows >= SHORTEST * windows[np.argmin(errors)])
+        least = max(_between_bursts(np.diff(t[own])) for own in runs(codes))
         window = max(float(windows[np.argmax(near | (errors <= exact))]), least)
-    blunted = _at(window, windows, bias)
     n = X.shape[1]
     noise = variance * _gain(stretches, window)
     return Smoothing(
         window,
         state_noise=float(np.sqrt(variance / n)),
         velocity_noise=float(np.sqrt(noise / n)),
-        error=float(np.sqrt((noise + blunted) / n)),
-        is_exact=bool(variance * _gain(stretches, windows[0]) <= exact),
+        error=float(np.sqrt((noise + _at(window, windows, bias)) / n)),
+        is_exact=bool(left[0] <= exact),
     )
 
 
-def _end_of_roughness(stretches: Sequence[_Stretch], tried: Sequence[float], finest: float, gain: float) -> float:
-    """Return the longest window at which slopes differ no more than at the finest, where in between they do a little.
+def _differ_ever_longer(stretches: Sequence[_Stretch], finest: float) -> tuple[Array, Array, Array, bool]:
+    """Try ever longer windows until their slopes differ by more than noise.
 
-    Of a motion that is sampled finely enough they differ ever more, and white noise shows between neighbours.
+    Returns
+    -------
+    windows : ndarray of shape (M,)
+        Seconds.
+    D, K : ndarray of shape (M,)
+        How much slopes differ there, and what white noise of variance 1 makes it.
+    rises : bool
+        Whether D rises at the last one; otherwise the episodes are not long enough for it to.
     """
-    if gain * _between_neighbours(stretches) > WHITE * finest:
+    tried = [2 * finest * half for half in _halves(stretches, finest)]
+    differing: list[float] = []
+    gains: list[float] = []
+    rises, rough = False, 0.0
+    for w in tried:
+        difference, gain = _differ(stretches, w)
+        differing.append(difference)
+        gains.append(gain)
+        if w < 8 * finest * (1 - 1e-9) or w <= rough:
+            continue
+        rises = difference > FALLING * _at(w / 2, tried, differing)
+        if rises and not rough and w < 12 * finest * (1 - 1e-9):
+            rough = _end_of_roughness(stretches, [each for each in tried[1:] if each <= ROUGH * w])
+            rises = not rough
+        if rises:
+            break
+    return np.array(tried[: len(differing)]), np.array(differing), np.array(gains), rises
+
+
+def _end_of_roughness(stretches: Sequence[_Stretch], tried: Sequence[float]) -> float:
+    """Return the longest window whose slopes differ no more than those of the first, and in between but a little more.
+
+    It is 0 where there is none. Of a motion that is sampled finely enough they differ ever more, and white noise shows
+    between neighbours.
+    """
+    first, gain = _differ(stretches, tried[0])
+    if gain * _between_neighbours(stretches) > WHITE * first:
         return 0.0
-    differing = [_differ(stretches, w)[0] for w in tried[2:]]
-    back = [w for w, D in zip(tried[2:], differing, strict=True) if D <= AS_ROUGH * finest]
-    return back[-1] if back and max(differing) <= TWICE * finest else 0.0
+    differing = [_differ(stretches, w)[0] for w in tried[1:]]
+    back = [w for w, difference in zip(tried[1:], differing, strict=True) if difference <= AS_ROUGH * first]
+    return back[-1] if back and max(differing) <= TWICE * first else 0.0
 
 
 def _stretches(X: Array, t: Array) -> list[_Stretch]:
@@ -252,7 +270,7 @@ def _halves(stretches: Sequence[_Stretch], step: float) -> list[int]:
 
 
 def _differ(stretches: Sequence[_Stretch], window: float) -> tuple[float, float]:
-    """Return the mean squared difference of slopes by degree 2 and 4, and what white noise of variance 1 makes of it."""
+    """Return the mean squared difference of slopes by degree 2 and 4, and what white noise of variance 1 makes it."""
     from scipy.signal import oaconvolve
 
     total = gain = count = 0.0
@@ -323,7 +341,9 @@ def _difference(half: int) -> Array:
     return fine - np.pad(plain, (len(fine) - len(plain)) // 2)
 
 
-def _at(window: float, windows: Sequence[float] | NDArray[np.float64], values: Sequence[float] | Array) -> float:
+def _at(
+    window: float, windows: Sequence[float] | NDArray[np.float64], values: Sequence[float] | Array
+) -> float:
     """Interpolate positive values between windows, both by their logarithms."""
     tiny = np.finfo(np.float64).tiny
     known = np.log(np.maximum(np.asarray(values), tiny))

@@ -1,7 +1,6 @@
 """Recordings that lie in files, one after the other, as one source of samples."""
 
 import math
-import math
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -69,7 +68,11 @@ class Tables:
     def noise(self) -> float | None:
         """Standard deviation of the actions' noise, where it is known of all recordings; root mean square."""
         known = [each.noise for each in self.recordings if each.noise is not None]
-        return math.sqrt(sum(noise**2 for noise in known) / len(known)) if len(known) == len(self.recordings) else None
+        return (
+            math.sqrt(sum(noise**2 for noise in known) / len(known))
+            if len(known) == len(self.recordings)
+            else None
+        )
 
     @property
     def whole_episodes_for(self) -> str | None:

@@ -73,7 +73,11 @@ def relate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     X, U = np.empty_like(rows.X), np.empty_like(rows.U)
     for own in rows.runs():
         X[own], U[own] = _relate(rows.take(own), recording)
-    note = Note("relative", recording.name, describe(recording.columns.relative_to, recording.preparation.moving_centre))
+    note = Note(
+        "relative",
+        recording.name,
+        describe(recording.columns.relative_to, recording.preparation.moving_centre),
+    )
     return replace(rows, X=X, U=U, policy=None), (note,)
 
 

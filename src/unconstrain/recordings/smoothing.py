@@ -28,7 +28,7 @@ from unconstrain.recordings.notes import Note
 from unconstrain.recordings.steps import LONG_STEPS, comes_in_bursts, runs
 
 FALLING = 0.7
-"""Over twice the window, D falls to less than this share where it is noise. Even that of a random walk falls to half."""
+"""Over twice the window, D falls to less than this share where it is noise; that of a random walk falls to half."""
 
 STEP = 2**0.25
 """From one window tried to the next."""

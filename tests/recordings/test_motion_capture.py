@@ -68,7 +68,7 @@ def mot(mark="\t"):
 def test_header_blocks(tmp_path, content, time, said):
     path = tmp_path / "a.txt"
     path.write_text(content)
-    demos = uc.load(path, state="LHand", time=time)
+    demos = uc.load(path, state="LHand", time=time, window=0.3)
     assert demos.state_names == ("LHand.X", "LHand.Y", "LHand.Z")
     np.testing.assert_allclose(demos.states, HAND)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-9)

@@ -90,7 +90,7 @@ def test_json_lines_that_are_damaged(tmp_path, content, sentence):
 def test_workbooks(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     FRAME.to_excel(tmp_path / "a.xlsx")
-    demos = uc.load(tmp_path / "a.xlsx", **TXY)
+    demos = uc.load(tmp_path / "a.xlsx", **TXY, window=0.2)
     np.testing.assert_array_equal(demos.states, X)
     assert ["counts the rows" in note for note in demos.notes[:-1]] == [True]
     book = openpyxl.Workbook()

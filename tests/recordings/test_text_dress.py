@@ -28,7 +28,7 @@ def table(header="t,x,y", mark=",", comma=False, end=""):
 def read(tmp_path, content, name="a.csv", **options):
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    demos = load(path, **(options or TXY))
+    demos = load(path, **(options or TXY), window=0.2)
     np.testing.assert_allclose(demos.states, X, atol=1e-9)
     return demos
 
@@ -132,7 +132,7 @@ def test_thousands_are_no_decimals(tmp_path, mark):
     mark = "," if mark == "quoted" else mark
     path = tmp_path / "a.csv"
     path.write_text(f"t{mark}x\n" + "".join(f"{i / 10}{mark}{cell}\n" for i, cell in enumerate(cells)))
-    demos = load(path, state="x", time="t")
+    demos = load(path, state="x", time="t", window=0.2)
     assert demos.states[:, 0].tolist() == numbers
     assert demos.notes[:-1] == ("a.csv: commas in numbers of column 'x' are read as setting off thousands",)
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 KINDS = (
-    "saved", "guess", "time", "burst", "rotation", "turn", "frame", "actions", "empty", "repeated", "angle", "gap",
-    "speed", "short", "jump", "pause", "missing", "slow", "relative", "order", "read",
+    "saved", "guess", "time", "burst", "rotation", "turn", "frame", "actions", "smoothing", "empty", "repeated",
+    "angle", "gap", "speed", "short", "jump", "pause", "missing", "slow", "relative", "order", "read",
 )  # fmt: skip
 """In the order in which notes on one file are given; a new finding adds a line of its own here."""
 

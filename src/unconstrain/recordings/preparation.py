@@ -54,8 +54,9 @@ class Preparation:
     resample : float, optional
         Samples a second to which episodes are brought by linear interpolation, never across gaps. Columns that are
         filled at different rates are interpolated each between its own stamps.
-    window : float
-        Seconds over which states are smoothed when they are differentiated.
+    window : float, optional
+        Seconds over which states are smoothed when they are differentiated. By default it is found from their noise
+        (`recordings.smoothing`), and noted.
     gap : float, optional
         A step longer than this (s) splits an episode. By default, where states are differentiated, five times the
         episode's median step does.
@@ -95,7 +96,7 @@ class Preparation:
     action_is: str | None = None
     drop: str | Sequence[str] | None = None
     resample: float | None = None
-    window: float = 0.2
+    window: float | None = None
     gap: float | None = None
     max_speed: float | None = None
     min_speed: float | None = None

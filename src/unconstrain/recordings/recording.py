@@ -12,11 +12,13 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.actions import VELOCITY, ActionKind
 from unconstrain.recordings.blocks import number_values
 from unconstrain.recordings.columns import NO_ANGLE, Columns
+from unconstrain.recordings.derivative import longest_window
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.formats.base import ColumnKey, Declared, Format
 from unconstrain.recordings.pieces import Piece, read_labels, read_numbers
 from unconstrain.recordings.preparation import TIME_UNITS, Preparation
 from unconstrain.recordings.roles import Roles
+from unconstrain.recordings.smoothing import Smoothing
 from unconstrain.recordings.steps import runs
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.time import Clock
@@ -28,7 +30,7 @@ BLOCKS = 5
 """Into how many contiguous blocks a single file without episodes is cut, which streams take for episodes."""
 
 FIRST_ROWS = 10_000
-"""Rows, at most, by which it is decided how stamps are read, and what actions are."""
+"""Rows, at most, by which it is decided how stamps are read, what actions are, and how long states are smoothed."""
 
 
 class Episodes(NamedTuple):
@@ -81,6 +83,8 @@ class Recording:
         The recording whose unit of time is taken where it has to be guessed.
     place : Space, optional
         What the states in the files are; by default numbers.
+    smoothing : Smoothing, optional
+        Where something is differentiated, what was found of the states' noise.
     """
 
     shown: str
@@ -97,6 +101,7 @@ class Recording:
     kind: ActionKind = VELOCITY
     leader: "Recording | None" = None
     place: Space | None = None
+    smoothing: Smoothing | None = None
 
     @property
     def recorded_space(self) -> Space:
@@ -145,6 +150,27 @@ class Recording:
     def smooths(self) -> bool:
         """Whether anything is differentiated over a window: states, or what they are relative to, or velocities."""
         return self.differentiates or bool(self.roles.reference) or self.preparation.order == 2
+
+    @property
+    def window(self) -> float:
+        """Over how long (s) states are smoothed when they are differentiated."""
+        if self.preparation.window is not None:
+            return self.preparation.window
+        # Where nothing could be found, the fewest samples that have a slope.
+        return 2 * self.step if self.smoothing is None else self.smoothing.window
+
+    def fit_window(self, stamps: NDArray[np.float64]) -> float:
+        """Return over how long (s) an episode with these stamps (N,) is smoothed: what was found may be too long."""
+        return min(self.window, longest_window(stamps)) if self.preparation.window is None else self.window
+
+    @property
+    def noise(self) -> float | None:
+        """Standard deviation of the noise of actions that were differentiated, where it is known."""
+        if self.preparation.order == 2 or self.roles.rotations:
+            return None  # that of accelerations and of turning is not known
+        if self.differentiates:
+            return None if self.smoothing is None else self.smoothing.velocity_noise
+        return self.declared.noise if self.saves and self.declared is not None else None
 
     @property
     def splits(self) -> bool:
@@ -329,7 +355,7 @@ class Recording:
     @property
     def shortest(self) -> float:
         """How long (s) a fragment of a split episode has to last."""
-        window = self.preparation.window if self.smooths else 0.0
+        window = self.window if self.smooths else 0.0
         return max(window, self.preparation.min_duration or 0.0)
 
     def keys(self, everything: bool) -> list[ColumnKey]:

@@ -283,6 +283,7 @@ class Recordings:
             action_names=names[1],
             episode_labels=[labels.of[key] for key in numbers],
             notes=[str(note) for note in notes],
+            noise=self.source.noise,
         )
 
 

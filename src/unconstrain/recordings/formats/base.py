@@ -43,6 +43,7 @@ class Declared:
     state_names, action_names, episode_labels, notes : tuple of str, optional
         As `Demonstrations` has them.
     space : Space, optional
+    noise : float, optional
         As `Demonstrations` has it.
     """
 
@@ -57,6 +58,7 @@ class Declared:
     episode_labels: tuple[str, ...] = ()
     space: Space | None = None
     notes: tuple[str, ...] = ()
+    noise: float | None = None
 
 
 def note_guesses(guesses: Iterable[str]) -> dict[bytes, bytes] | None:

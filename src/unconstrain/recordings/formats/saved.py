@@ -1,6 +1,7 @@
 """What this package wrote itself: archives of demonstrations, and demonstrations that are in memory still."""
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -162,6 +163,10 @@ def declare(about: Any, shown: str) -> Declared:
         projections = roles.get("projections")
         columns = Columns(state, action, single[0], episode)  # type: ignore[arg-type]
         space = from_description(about["space"]) if "space" in about else None
+        noise = about.get("noise")
+        noise = None if noise is None else float(noise)
+        if noise is not None and not 0 <= noise < math.inf:
+            raise ValueError("the noise is none")
     except (UnconstrainError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations") from error
     if newer:
@@ -178,4 +183,5 @@ def declare(about: Any, shown: str) -> Declared:
         episode_labels=names["episode_labels"],
         space=space,
         notes=names["notes"],
+        noise=noise,
     )

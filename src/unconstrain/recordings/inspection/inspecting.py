@@ -510,13 +510,6 @@ def _roles(
     plain = Preparation(time_unit=unit, rate=rate if clock is None and actions is None else None)
     velocities = () if actions is None else actions.places
     yield _Proposal(columns, plain, notes, velocities, group.places)
-    if actions is None and clock is not None:
-        window = _shortest_window(clock, judged.codes)
-        if window is not None:
-            text = (
-                f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
-            )
-            yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
     resampled = _rate_of_each(group.places, clock, judged)
     if resampled is not None:
         text = (
@@ -586,18 +579,6 @@ def _unread(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
             f"{named}: text such as {str(looked.texts[odd[0]][0])!r}, which is no number, and left out"
         )
     return notes
-
-
-def _shortest_window(clock: _Clock, codes: Codes) -> float | None:
-    """Return the window (s) that fits the shortest episode, where that is shorter than usual and has three samples."""
-    order = np.argsort(codes, kind="stable")
-    parts = np.split(clock.seconds[order], np.cumsum(np.bincount(codes))[:-1])
-    if not parts or min(map(len, parts)) < 3:
-        return None
-    duration, steps = min((float(part[-1] - part[0]), len(part) - 1) for part in parts)
-    if duration >= Preparation.window or duration <= 0:
-        return None
-    return float(f"{max(2.0 * duration / steps, 0.5 * duration):.3g}")
 
 
 def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judged) -> tuple[float, str]:

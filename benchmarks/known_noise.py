@@ -63,7 +63,11 @@ def errors(kind: str, free: float, noise: float, risk: str, seed: int) -> list[f
     X = np.concatenate(movements)
     true = policy(X)
     found = []
-    for window, known in ((USUAL, None), (smoothing.window, None), (smoothing.window, smoothing.velocity_noise)):
+    for window, known in (
+        (USUAL, None),
+        (smoothing.window, None),
+        (smoothing.window, smoothing.velocity_noise),
+    ):
         actions = np.concatenate([differentiate(each, t, window=window) for each in seen])
         features = uc.NormalizedRBF(n_centers=36, random_state=0) if kind == "limit cycle" else None
         learnt = uc.ParametricPolicy(features, risk=risk, noise=known).fit(states, actions, groups=episodes)
@@ -73,13 +77,19 @@ def errors(kind: str, free: float, noise: float, risk: str, seed: int) -> list[f
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.known_noise", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.known_noise", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--risk", choices=("adaptive", "corrected"), default="corrected")
     parser.add_argument("--trials", type=int, default=5)
     given = parser.parse_args()
     warnings.simplefilter("ignore")
-    rows = [(kind, free, noise) for kind in ("limit cycle", "linear, 6-D") for free in FREE for noise in NOISE]
-    print("| policy | free | noise of positions | nUPE over 0.2 s | over the window found | and its noise known |")
+    rows = [
+        (kind, free, noise) for kind in ("limit cycle", "linear, 6-D") for free in FREE for noise in NOISE
+    ]
+    print(
+        "| policy | free | noise of positions | nUPE over 0.2 s | over the window found | and its noise known |"
+    )
     print("| --- | --- | --- | --- | --- | --- |")
     for kind, free, noise in track(rows, given.risk, transient=True):
         found = [errors(kind, free, noise, given.risk, seed) for seed in range(100, 100 + given.trials)]

@@ -1,4 +1,4 @@
-"""What it helps a policy to know the noise of the velocities it learns from, and the window that is found.
+"""What it helps a policy to know the noise of its velocities, and to learn from those over the window that is found.
 
 `python -m benchmarks.known_noise` prints the table of docs/velocities.md; with --risk adaptive it takes some minutes.
 """

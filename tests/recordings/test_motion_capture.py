@@ -158,7 +158,7 @@ def test_qualisys(tmp_path, names, stamps):
     demos = uc.load(path, state=["LHand X", "LHand Y", "LHand Z"], time="Time" if stamps else None)
     np.testing.assert_allclose(demos.states, HAND)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-9)
-    assert "LHand X, LHand Y, LHand Z in mm" in demos.notes[-2]
+    assert "LHand X, LHand Y, LHand Z in mm" in " ".join(demos.notes)
     assert uc.inspect(path).columns[2 if stamps else 0].unit == "mm"
 
 
@@ -169,7 +169,7 @@ def test_bodies_of_qualisys(tmp_path):
     (tmp_path / "a.tsv").write_text(head + body)
     demos = uc.load(tmp_path / "a.tsv", state=["Cup X", "Cup Y", "Cup Yaw"])
     np.testing.assert_allclose(demos.states[:, :2], HAND[:, :2] + 1)
-    assert "Cup X, Cup Y in mm; Cup Yaw in deg" in demos.notes[-2]
+    assert "Cup X, Cup Y in mm; Cup Yaw in deg" in " ".join(demos.notes)
 
 
 def labview(columns):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from numbers import Real
 
 from unconstrain.errors import DataError, show
-from unconstrain.spaces.rotation import FRAMES
+from unconstrain.spaces.words import FRAMES
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Ticks a second."""

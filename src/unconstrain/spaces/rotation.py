@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from unconstrain.arrays import check_choice
 from unconstrain.spaces.base import Array, Space
+from unconstrain.spaces.words import FRAMES
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation as Rotations
 
 WRITTEN = {"xyzw": 4, "wxyz": 4, "rotvec": 3, "euler": 3, "matrix": 9}
 """How rotations may be written, and in how many numbers."""
-
-FRAMES = ("world", "body")
-"""In which frame angular velocities are."""
 
 NEAR = np.radians(150)
 """Rotations that lie within this angle of their mean are laid out as rotation vectors; others as matrices."""

@@ -23,6 +23,9 @@ ANGLE_UNITS = ("rad", "deg")
 
 ORDERS = (1, 2)
 
+# Of smaller numbers the inverse, such as the step of a rate, is infinite.
+SMALLEST = 1e-300
+
 CHOICES = {
     "time_unit": tuple(TIME_UNITS),
     "action_is": ACTION_KINDS,
@@ -129,7 +132,7 @@ class Preparation:
                 number = float(value)
             except (TypeError, ValueError, OverflowError):
                 number = math.nan
-            if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
+            if isinstance(value, bool) or not isinstance(value, Real) or not SMALLEST < number < math.inf:
                 raise DataError(f"{field.name} must be a positive number, got {show(value)}")
 
     def drops(self, what: str) -> bool:

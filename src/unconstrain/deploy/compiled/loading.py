@@ -41,6 +41,6 @@ def load_compiled(path: str | PathLike[str]) -> CompiledPolicy:
         own = {name: array for name, array in arrays.items() if about is None or name not in SPACE_ARRAYS}
         step = KINDS[tree["kind"]](**own)
         return step if about is None else InSpace.restore(step, about, arrays)
-    except (UnconstrainError, ValueError, TypeError, KeyError) as error:
+    except (UnconstrainError, ValueError, TypeError, KeyError, AttributeError) as error:
         reason = str(error) if isinstance(error, UnconstrainError) else "its arrays are not those of a policy"
         raise damaged(path, Kind.COMPILED_POLICY, reason) from None

@@ -56,8 +56,8 @@ class Declared:
     state_names: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
     episode_labels: tuple[str, ...] = ()
-    space: Space | None = None
     notes: tuple[str, ...] = ()
+    space: Space | None = None
     noise: float | None = None
 
 

@@ -44,10 +44,10 @@ class Layout:
         Whether lines may lack separators at their ends, or have too many.
     ends_at_blank : bool
         Whether an empty line ends the table.
-    widths : dict of int to int
-        Of the columns whose cells are lists of numbers in brackets, how many numbers these hold.
     heading : tuple of bytes
         The lines that name the columns; where they come again, the logger began anew.
+    widths : dict of int to int
+        Of the columns whose cells are lists of numbers in brackets, how many numbers these hold.
     """
 
     delimiter: str

@@ -491,6 +491,7 @@ class Policy(RegressorMixin, BaseEstimator):
         DataError
             Nothing moves.
         """
+        check_is_fitted(self)
         U = self.scaled(check_actions(y))
         P = self.scaled(check_actions(self.predict(X), "predictions"))
         if self.solution_.belief is not None:

@@ -44,7 +44,7 @@ def described(module: str) -> Iterator[str]:
 
 
 def points_to_base(cls: object, method: object) -> bool:
-    """Whether a method says in a sentence what it does, and for the rest names that of a base class, which is checked."""
+    """Whether a method says what it does, and for the rest names that of a base class, which is checked."""
     name, text = getattr(method, "__name__", ""), getattr(method, "__doc__", None) or ""
     bases = inspect.getmro(cls)[1:] if inspect.isclass(cls) else ()
     return any(text.endswith(f"ee `{base.__name__}.{name}`.") and name in vars(base) for base in bases)

@@ -222,8 +222,8 @@ class Rotation(Space):
 
     def embed(self, X: Array, base: Array | None) -> Array:
         """Lay rotations out as rotation vectors from the base, or as matrices; see `Space.embed`."""
-        # Vectors are in the frame of the velocities, so that the velocity of one near zero is ω. Matrices are scaled, so
-        # that what is near lies as far apart as the angle is.
+        # Vectors are in the frame of the velocities: that of one near zero is ω. Matrices are scaled, so that what is
+        # near lies as far apart as the angle is.
         if base is not None:
             return self.difference(np.tile(base, (len(X), 1)), X)
         return self.rotations(X).as_matrix().reshape(-1, 9) / np.sqrt(2.0)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.fuzz.engine import AREAS
 
-NUMBER = 150
+NUMBER = 100
 """Of inputs in each area."""
 
 

@@ -118,7 +118,7 @@ def test_a_finer_model_is_misled_as_the_page_says(printed):
     )
     shares = [found[risk][1] for risk in ("adaptive", "direct", "inconsistency")]
     assert shares == pytest.approx([float(share) for share in told.groups()], abs=1.0)
-    demos = [uc.load(printed[1] / f"{name}_circle.npz") for name in ("planer", "curve")]
+    demos = [uc.load(printed[1] / f"{name}_circle.parquet") for name in ("planer", "curve")]
     both = uc.Demonstrations.concatenate(demos)
     P = uc.load_policy(printed[1] / "fine.skops").predict(both.states)
     size = float(re.search(r"square, ([\d.]+) times as large", page).group(1))
@@ -132,7 +132,7 @@ def test_a_finer_model_is_misled_as_the_page_says(printed):
 
 def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     place = printed[1]
-    flat, curved = (uc.load(place / f"{name}_circle.npz") for name in ("planer", "curve"))
+    flat, curved = (uc.load(place / f"{name}_circle.parquet") for name in ("planer", "curve"))
     learnt, adaptive = (
         np.column_stack([path[axis] for axis in "xyz"])
         for path in (

@@ -202,7 +202,35 @@ def view(policy: Path | None, movements: int, robot: Path | None, lock: str, han
     viewer.view(demonstrator, learnt)
 
 
+@click.command("stability", cls=Command)
+@click.argument("data", type=PATH, metavar="DATA_FOLDER")
+@click.option(
+    "--repetitions",
+    type=COUNT,
+    default=3,
+    show_default=True,
+    help="How often demonstrations are drawn to learn from.",
+)
+@click.option("--shape", multiple=True, metavar="NAME", help="Not all shapes; may be repeated.")
+def stability(data: Path, repetitions: int, shape: tuple[str, ...]) -> None:
+    """Follow handwriting from everywhere, plain and stabilised: does every start lead to the goal.
+
+    DATA_FOLDER holds handwriting/*.mat.
+    """
+    from reproduction.stability import list_shapes, measure, merge, tabulate
+
+    console = _console()
+    shapes = shape or list_shapes(data)
+    with console.status("learning") as status:
+        rows = []
+        for name in shapes:
+            status.update(f"learning {name}")
+            rows.append(merge(name, [measure(data, name, repetition) for repetition in range(repetitions)]))
+    console.print(tabulate(rows), soft_wrap=True)
+
+
 program.add_command(run_all)
+program.add_command(stability)
 program.add_command(view)
 
 

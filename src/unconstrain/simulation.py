@@ -179,7 +179,9 @@ def simulate(
     space = getattr(policy, "space_", None) or Numbers(x.shape[1])
     scale = getattr(policy, "scale_", None)
     # What makes a policy stable has to know the constraint; what projects its action afterwards would undo it.
-    under = policy.predict_constrained if getattr(policy, "stability_", None) is not None else None
+    under: Any = None
+    if getattr(policy, "stability_", None) is not None:
+        under = getattr(policy, "predict_constrained", None)
     # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(samples):

@@ -87,7 +87,12 @@ def fit(
         )
     if checkpoint is not None and cluster is not None:
         raise PolicyError("a cluster makes up for workers it loses: leave out checkpoint= or cluster=")
-    needs_memory = {"--model auto": model.is_chosen, "figure=": figure, "folds=": folds, "stable_at=": stable_at}
+    needs_memory = {
+        "--model auto": model.is_chosen,
+        "figure=": figure,
+        "folds=": folds,
+        "stable_at=": stable_at,
+    }
     named = [option for option, given in needs_memory.items() if given]
     is_stream = checkpoint is not None or cluster is not None
     if is_stream and named:

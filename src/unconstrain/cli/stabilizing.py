@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import click
-
 from unconstrain.cli import reporting
 from unconstrain.cli.declared import Numbers, option
 from unconstrain.errors import DataError
@@ -67,7 +65,8 @@ def stabilize(
         return policy.stabilized(policy.space_.origin, demos)
     if demos is None:
         raise DataError(
-            "where the recordings end is not saved with the policy: give the goal in numbers, or fit with --stable-at end"
+            "where the recordings end is not saved with the policy: give the goal in numbers, or fit with "
+            "--stable-at end"
         )
     return policy.stabilized(goal, demos)
 
@@ -98,7 +97,8 @@ def describe_arrival(stable: "Policy", movement: "Demonstrations") -> str:
     from unconstrain.stability.stabilizing import ARRIVED
 
     stability = stable.stability_
-    assert stability is not None and movement.time is not None
+    assert stability is not None
+    assert movement.time is not None
     away = stability.distance(movement.states)
     left = f"{away[-1]:.3g} of the extent of the recorded states"
     if away[-1] <= ARRIVED:

@@ -58,9 +58,13 @@ def learn_stability(
     X = _find_centers(policy) if demos is None else _find_states(policy, demos)
     if isinstance(goal, str):
         if goal != END:
-            raise DataError(f'a goal is a state, or "end" for the mean of where episodes end, not {quote(goal)}')
+            raise DataError(
+                f'a goal is a state, or "end" for the mean of where episodes end, not {quote(goal)}'
+            )
         if not isinstance(demos, Demonstrations):
-            raise DataError('the goal "end" is where the episodes of demonstrations end: give these too, or a state')
+            raise DataError(
+                'the goal "end" is where the episodes of demonstrations end: give these too, or a state'
+            )
         at, apart = find_end(demos, space, policy.scale_)
     else:
         at, apart = _check_goal(goal, space), None
@@ -87,12 +91,14 @@ def _describe_end(episodes: int, apart: float, extent: float) -> str:
 def _describe_change(stability: Stability, X: np.ndarray, U: np.ndarray) -> str:
     """Say by how much actions (N, d) in the recorded region are changed."""
     changed = (stability.stabilize(X, U) - U) / stability.scale
-    stays = float(np.mean(np.linalg.norm(changed, axis=1) <= UNCHANGED * np.linalg.norm(U / stability.scale, axis=1)))
+    stays = float(
+        np.mean(np.linalg.norm(changed, axis=1) <= UNCHANGED * np.linalg.norm(U / stability.scale, axis=1))
+    )
     change, speed = (float(np.sqrt(np.mean(np.sum(A**2, axis=1)))) for A in (changed, U / stability.scale))
     share = f", {change / speed:.2g} of their usual length" if speed else ""
     return (
-        f"in the recorded region {stays:.0%} of the actions lead towards the goal as they are; all together are changed "
-        f"by {change:.3g} (root mean square){share}"
+        f"in the recorded region {stays:.0%} of the actions lead towards the goal as they are; all together are "
+        f"changed by {change:.3g} (root mean square){share}"
     )
 
 
@@ -148,7 +154,9 @@ def _find_centers(policy: "Policy") -> np.ndarray:
 def _check_goal(goal: Any, space: Space) -> np.ndarray:
     at = np.ravel(check_numbers(goal, "the goal"))
     if at.shape != (space.n_states,):
-        raise DataError(f"the goal must have {space.n_states} numbers, as the policy has states, got {at.size}")
+        raise DataError(
+            f"the goal must have {space.n_states} numbers, as the policy has states, got {at.size}"
+        )
     if not np.isfinite(at).all():
         raise DataError("the goal has NaN or infinity: give finite numbers")
     if space.faults(at[None]).any():

@@ -1,4 +1,4 @@
-"""Movement that ends where it should: a learnt Lyapunov function, and the smallest change of an action that makes it fall.
+"""Movement that ends where it should: a Lyapunov function, and the smallest change of actions that lets it fall.
 
 - `lyapunov` is the function V, whose only critical point is the goal.
 - `learning` fits V to what a policy does, so that V falls along it as far as that can be.

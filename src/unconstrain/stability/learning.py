@@ -140,9 +140,7 @@ class _Loss:
         change = np.maximum(0.0, rises / length + self.margin)
         # By the gradient of V, and from there by what it is made of.
         outer = (2.0 / count) * change[:, None]
-        by_gradient = outer * (
-            self.beyond / length[:, None] - (rises / length**3)[:, None] * gradient
-        )
+        by_gradient = outer * (self.beyond / length[:, None] - (rises / length**3)[:, None] * gradient)
         by_parts = 2.0 * (parts > 0) * np.einsum("ni,nli->nl", by_gradient, slopes)
         by_matrices = np.empty_like(P)
         by_matrices[0] = 2.0 * by_gradient.T @ E

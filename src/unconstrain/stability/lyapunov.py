@@ -74,9 +74,7 @@ class Lyapunov:
         linear = self._linear / unit[:, None, None]
         parts = np.maximum(0.0, np.einsum("nli,ni->nl", products[:, 1:] - linear, E))
         slopes = 2.0 * products[:, 1:] - linear
-        gradient = 2.0 * (
-            products[:, 0] / unit[:, None] ** 2 + np.einsum("nl,nli->ni", parts, slopes)
-        )
+        gradient = 2.0 * (products[:, 0] / unit[:, None] ** 2 + np.einsum("nl,nli->ni", parts, slopes))
         return Near(unit, E, products, parts, slopes, gradient)
 
     def longest_share(self, near: "Near", W: Array) -> Array:

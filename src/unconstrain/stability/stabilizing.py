@@ -9,7 +9,7 @@ from unconstrain.constraints.nullspace import in_metric
 from unconstrain.errors import PolicyError
 from unconstrain.spaces import SecondOrder, Space
 from unconstrain.stability.learning import learn_lyapunov
-from unconstrain.stability.lyapunov import Array, Lyapunov, Near
+from unconstrain.stability.lyapunov import Array, Lyapunov
 
 PACE = 0.15
 """Share of the usual speed with which states approach the goal at least, as far as V tells."""
@@ -162,6 +162,8 @@ class Stability:
             change = np.divide(needed, steepness, out=np.zeros_like(needed), where=steepness > 0)
             change[change < 0] = 0.0
             U = U - change[:, None] * down
+            if projections is not None:  # where little is left, rounding in it has been multiplied
+                U = np.einsum("nij,nj->ni", N, U)
             share = self.lyapunov.longest_share(near, U * (self.hold / near.unit)[:, None])
             return share[:, None] * U * self.scale
 
@@ -186,7 +188,7 @@ class Stability:
         """
         near = self.lyapunov.near(self._from_goal(X))
         down = np.einsum("nij,nj->ni", in_metric(projections, self.scale), near.gradient)
-        return np.sqrt(self._share_left(near.gradient, down))
+        return self._share_left(near.gradient, down)
 
     def value(self, X: Array) -> Array:
         """Compute V at states (N, n), (N,)."""
@@ -206,9 +208,7 @@ class Stability:
 
     @staticmethod
     def _share_left(gradient: Array, down: Array) -> Array:
-        """Compute how much of the squared slope constraints leave, (N,)."""
+        """Compute how much of the slope constraints leave, (N,)."""
         whole = np.einsum("ni,ni->n", gradient, gradient)
-        left = np.divide(
-            np.einsum("ni,ni->n", down, down), whole, out=np.ones_like(whole), where=whole > 0
-        )
-        return np.where(left < BLOCKED, 0.0, left)
+        left = np.divide(np.einsum("ni,ni->n", down, down), whole, out=np.ones_like(whole), where=whole > 0)
+        return np.where(left < BLOCKED, 0.0, np.sqrt(left))

@@ -94,7 +94,11 @@ class InSpace(CompiledPolicy):
     def contents(self) -> tuple[dict[str, Any], dict[str, ndarray]]:
         """Return what a file holds; see `CompiledPolicy.contents`."""
         tree, arrays = self.step.contents()
-        own = {"space_scale": self.scale} if self.base is None else {"space_scale": self.scale, "space_base": self.base}
+        own = (
+            {"space_scale": self.scale}
+            if self.base is None
+            else {"space_scale": self.scale, "space_base": self.base}
+        )
         return {**tree, "space": self.space.describe()}, {**arrays, **own}
 
     def magnitude(self, X: ndarray) -> float:

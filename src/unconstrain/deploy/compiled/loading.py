@@ -44,6 +44,6 @@ def load_compiled(path: str | PathLike[str]) -> CompiledPolicy:
         if about is not None:
             step = InSpace.restore(step, about, arrays)
         return step if stable is None else Stabilized.restore(step, stable, arrays)
-    except (UnconstrainError, ValueError, TypeError, KeyError) as error:
+    except (UnconstrainError, ValueError, TypeError, KeyError, AttributeError) as error:
         reason = str(error) if isinstance(error, UnconstrainError) else "its arrays are not those of a policy"
         raise damaged(path, Kind.COMPILED_POLICY, reason) from None

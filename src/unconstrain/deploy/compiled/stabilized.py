@@ -77,7 +77,9 @@ class Stabilized(CompiledPolicy):
         if not all(np.isfinite(value) and value > 0 for value in numbers.values()):
             raise PolicyError("the numbers of a stabilised policy must be positive and finite")
         space = from_description(about["space"])
-        return cls(step, Stability(space, goal, scale, Lyapunov(matrices, offsets), **numbers))
+        pace, radius, pull, extent, hold = numbers.values()
+        lyapunov = Lyapunov(matrices, offsets)
+        return cls(step, Stability(space, goal, scale, lyapunov, pace, radius, pull, extent, hold))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.step, self.stability)
@@ -118,7 +120,9 @@ class Stabilized(CompiledPolicy):
             and arrays["offsets"].shape == (count - 1, d)
         )
         if not fits:
-            raise PolicyError("the Lyapunov function of a stabilised policy does not go with its states and actions")
+            raise PolicyError(
+                "the Lyapunov function of a stabilised policy does not go with its states and actions"
+            )
         return n, d
 
     def _prepare(self, arrays: dict[str, ndarray]) -> tuple[Any, ...]:
@@ -148,7 +152,7 @@ class Stabilized(CompiledPolicy):
         products = stacked.dot(e).reshape(shape)
         slopes = products[1:] - linear
         parts = slopes.dot(e)
-        np.maximum(parts, 0.0, parts)
+        np.maximum(parts, 0.0, out=parts)
         slopes += products[1:]
         gradient = parts.dot(slopes)
         gradient += products[0]
@@ -164,7 +168,7 @@ class Stabilized(CompiledPolicy):
             curved = curved[1:]
             first = slopes.dot(step)
             last = parts + first + curved
-            np.maximum(last, 0.0, last)
+            np.maximum(last, 0.0, out=last)
             steep = np.maximum(np.abs(first), np.abs(first + 2.0 * curved))
             top = np.maximum(parts, last)
             bound += 2.0 * (steep * steep).dot(top > 0.0) + 4.0 * top.dot(curved)

@@ -1,0 +1,207 @@
+"""Whether every start leads to the goal: handwriting (LASA), plain and stabilised."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from reproduction.adaptive.recorded import SHOWN, join, list_files, load_demonstrations
+from reproduction.markdown import table
+from unconstrain.errors import UnconstrainError
+from unconstrain.policies import LocallyLinearPolicy
+from unconstrain.policies.base import Policy
+
+TUNED_ON = ("Angle", "BendedLine", "Snake", "Sshape")
+"""Shapes that the constants of `unconstrain.stability` were chosen on."""
+
+GRID, INFLATED = 15, 1.1
+"""Starts along each side of the box that holds all demonstrations, and by how much that is larger."""
+
+ARRIVED = 0.01
+"""Share of the box's longer side within which a movement has to end."""
+
+DT, LONGEST = 0.02, 10.0
+"""Seconds a step, and how long a movement may take, in durations of the longest demonstration."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was found of a shape.
+
+    Attributes
+    ----------
+    shape : str
+        Its name.
+    starts : int
+        How many movements were begun.
+    plain, stable : float
+        Share of them that end at the goal.
+    latest : float
+        When the last of the stabilised movements arrives, in durations of the longest demonstration.
+    plain_error, stable_error : float
+        Root mean square of the velocity's error on held-out demonstrations, mm/s.
+    change : float
+        Root mean square of what stabilising changes of the velocity there, mm/s.
+    speed : float
+        Root mean square of the velocity there, mm/s.
+    rises : int
+        Steps over which the Lyapunov function rose.
+    """
+
+    shape: str
+    starts: int
+    plain: float
+    stable: float
+    latest: float
+    plain_error: float
+    stable_error: float
+    change: float
+    speed: float
+    rises: int
+
+
+def measure(folder: Path, shape: str, repetition: int) -> Row:
+    """Learn a shape from four of its demonstrations, and follow the policy from everywhere.
+
+    Parameters
+    ----------
+    folder : Path
+        That holds `handwriting/*.mat`.
+    shape : str
+        Name of the file, without its suffix.
+    repetition : int
+        Which four are drawn.
+
+    Returns
+    -------
+    Row
+        What was found.
+
+    Raises
+    ------
+    UnconstrainError
+        The file is missing or damaged.
+    """
+    path = folder / "handwriting" / f"{shape}.mat"
+    pairs = load_demonstrations(path, "demos", transposed=True)
+    times = _load_times(path)
+    low, high = (edge(np.vstack([X for X, _ in pairs]), axis=0) for edge in (np.min, np.max))
+    size, duration = float((high - low).max()), max(float(t[-1]) for t in times)
+    margin = (INFLATED - 1.0) / 2 * (high - low)
+    axes = [np.linspace(a, b, GRID) for a, b in zip(low - margin, high + margin, strict=True)]
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(low))
+    starts = np.vstack([grid, [X[0] for X, _ in pairs]])
+    steps = int(LONGEST * duration / DT)
+    order = np.random.default_rng(repetition).permutation(len(pairs))
+    train, held_out = (join([pairs[i] for i in which]) for which in (order[:SHOWN], order[SHOWN:]))
+    train = replace(train, time=np.concatenate([times[i] for i in order[:SHOWN]]))
+    plain = LocallyLinearPolicy().fit(train)
+    stable = plain.stabilized("end", train)
+    ends, latest, rises = _follow(stable, starts, steps, size)
+    own, changed = (policy.predict(held_out.states) for policy in (plain, stable))
+    return Row(
+        shape=shape,
+        starts=len(starts),
+        plain=_arrive(plain, starts, steps, size),
+        stable=ends,
+        latest=latest / duration,
+        plain_error=_root_mean_square(own - held_out.actions),
+        stable_error=_root_mean_square(changed - held_out.actions),
+        change=_root_mean_square(changed - own),
+        speed=_root_mean_square(held_out.actions),
+        rises=rises,
+    )
+
+
+def merge(name: str, rows: list[Row]) -> Row:
+    """Put rows of as many starts each together: means of shares and errors, the latest arrival, all rises."""
+
+    def mean(field: str) -> float:
+        return float(np.mean([getattr(row, field) for row in rows]))
+
+    return Row(
+        shape=name,
+        starts=sum(row.starts for row in rows),
+        plain=mean("plain"),
+        stable=mean("stable"),
+        latest=max(row.latest for row in rows),
+        plain_error=mean("plain_error"),
+        stable_error=mean("stable_error"),
+        change=mean("change"),
+        speed=mean("speed"),
+        rises=sum(row.rises for row in rows),
+    )
+
+
+def list_shapes(folder: Path) -> list[str]:
+    """List the shapes in a folder of recordings. Raises `UnconstrainError` where there are none."""
+    shapes = [path.stem for path in list_files("handwriting", folder)]
+    if not shapes:
+        raise UnconstrainError(f"{folder} does not hold handwriting/*.mat: give the folder of recordings")
+    return shapes
+
+
+def tabulate(rows: list[Row]) -> str:
+    """Write a table in Markdown, with a line for all shapes together."""
+    everything = merge("all", rows)
+    return table(
+        (
+            "shape",
+            "starts",
+            "reach the goal: plain",
+            "stabilised",
+            "the last after",
+            "held-out error: plain",
+            "stabilised",
+            "changed by",
+            "of speed",
+            "steps on which V rose",
+        ),
+        [
+            (
+                f"{row.shape}{' *' if row.shape in TUNED_ON else ''}",
+                f"{row.starts}",
+                f"{row.plain:.1%}",
+                f"{row.stable:.1%}",
+                f"{row.latest:.1f}",
+                f"{row.plain_error:.2f}",
+                f"{row.stable_error:.2f}",
+                f"{row.change:.2f}",
+                f"{row.speed:.1f}",
+                f"{row.rises}",
+            )
+            for row in (*rows, everything)
+        ],
+    )
+
+
+def _follow(policy: Policy, starts: np.ndarray, steps: int, size: float) -> tuple[float, float, int]:
+    """Return the share of starts that end at the goal, when the last of them arrives, and on how many steps V rose."""
+    movement = policy.rollout(starts, steps, DT)
+    assert policy.stability_ is not None
+    away = np.linalg.norm(movement.states, axis=1).reshape(len(starts), -1)
+    values = policy.stability_.value(movement.states).reshape(len(starts), -1)
+    rises = int(np.sum(values[:, 1:] > values[:, :-1]))
+    outside = away > ARRIVED * size
+    last = np.flatnonzero(outside.any(axis=0))
+    return float(np.mean(~outside[:, -1])), DT * (last[-1] + 1) if len(last) else 0.0, rises
+
+
+def _arrive(policy: Policy, starts: np.ndarray, steps: int, size: float) -> float:
+    """Return the share of starts from which a policy that may diverge ends at the goal."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        X = starts
+        for _ in range(steps):
+            going = np.linalg.norm(X, axis=1) < 100 * size
+            X = np.where(going[:, None], X + DT * policy.predict(np.where(going[:, None], X, 0.0)), X)
+    return float(np.mean(np.linalg.norm(X, axis=1) <= ARRIVED * size))
+
+
+def _load_times(path: Path) -> list[np.ndarray]:
+    from scipy.io import loadmat
+
+    return [np.asarray(one["t"], dtype=np.float64) for one in loadmat(path, simplify_cells=True)["demos"]]
+
+
+def _root_mean_square(U: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.sum(U**2, axis=1))))

@@ -4,10 +4,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from reproduction.adaptive.recorded import SHOWN, join, list_files, load_demonstrations
 from reproduction.markdown import table
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
+from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, TRUE
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
 
@@ -16,6 +19,9 @@ TUNED_ON = ("Angle", "BendedLine", "Snake", "Sshape")
 
 GRID, INFLATED = 15, 1.1
 """Starts along each side of the box that holds all demonstrations, and by how much that is larger."""
+
+PATHS = 6
+"""Movements that are drawn along each side of that box."""
 
 ARRIVED = 0.01
 """Share of the box's longer side within which a movement has to end."""
@@ -82,29 +88,18 @@ def measure(folder: Path, shape: str, repetition: int) -> Row:
     UnconstrainError
         The file is missing or damaged.
     """
-    path = folder / "handwriting" / f"{shape}.mat"
-    pairs = load_demonstrations(path, "demos", transposed=True)
-    times = _load_times(path)
-    low, high = (edge(np.vstack([X for X, _ in pairs]), axis=0) for edge in (np.min, np.max))
-    size, duration = float((high - low).max()), max(float(t[-1]) for t in times)
-    margin = (INFLATED - 1.0) / 2 * (high - low)
-    axes = [np.linspace(a, b, GRID) for a, b in zip(low - margin, high + margin, strict=True)]
-    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(low))
-    starts = np.vstack([grid, [X[0] for X, _ in pairs]])
-    steps = int(LONGEST * duration / DT)
-    order = np.random.default_rng(repetition).permutation(len(pairs))
-    train, held_out = (join([pairs[i] for i in which]) for which in (order[:SHOWN], order[SHOWN:]))
-    train = replace(train, time=np.concatenate([times[i] for i in order[:SHOWN]]))
-    plain = LocallyLinearPolicy().fit(train)
-    stable = plain.stabilized("end", train)
-    ends, latest, rises = _follow(stable, starts, steps, size)
+    learnt = _learn(folder, shape, repetition)
+    plain, stable, held_out = learnt.plain, learnt.stable, learnt.held_out
+    starts = np.vstack([learnt.grid(GRID), learnt.begins])
+    steps = int(LONGEST * learnt.duration / DT)
+    ends, latest, rises = _follow(stable, starts, steps, learnt.size)
     own, changed = (policy.predict(held_out.states) for policy in (plain, stable))
     return Row(
         shape=shape,
         starts=len(starts),
-        plain=_arrive(plain, starts, steps, size),
+        plain=_arrive(plain, starts, steps, learnt.size),
         stable=ends,
-        latest=latest / duration,
+        latest=latest / learnt.duration,
         plain_error=_root_mean_square(own - held_out.actions),
         stable_error=_root_mean_square(changed - held_out.actions),
         change=_root_mean_square(changed - own),
@@ -173,6 +168,85 @@ def tabulate(rows: list[Row]) -> str:
             for row in (*rows, everything)
         ],
     )
+
+
+def plot_shapes(folder: Path, shapes: list[str]) -> Figure:
+    """Plot where stabilised policies lead from everywhere, and the Lyapunov function's levels.
+
+    Parameters
+    ----------
+    folder : Path
+        That holds `handwriting/*.mat`.
+    shapes : list of str
+        A panel each.
+
+    Returns
+    -------
+    Figure
+        Recorded movements, rollouts, levels of V in grey, and the goal as a dot.
+    """
+    columns = min(len(shapes), 5)
+    rows = -(-len(shapes) // columns)
+    figure = Figure(figsize=(1.7 * columns, 1.8 * rows), layout="constrained")
+    panels = np.ravel(figure.subplots(rows, columns, squeeze=False))
+    for panel in panels[len(shapes) :]:
+        panel.remove()
+    for shape, panel in zip(shapes, panels, strict=False):
+        learnt = _learn(folder, shape, 0)
+        stability = learnt.stable.stability_
+        assert stability is not None
+        fine = learnt.grid(60)
+        x, y, levels = (each.reshape(60, 60) for each in (*fine.T, np.sqrt(stability.value(fine))))
+        panel.contour(x, y, levels, levels=12, colors=RECORDED, linewidths=0.3)
+        movement = learnt.stable.rollout(learnt.grid(PATHS), int(5 * learnt.duration / DT), DT)
+        for path in movement.states.reshape(PATHS**2, -1, 2):
+            panel.plot(*path.T, color=LEARNT, linewidth=0.4)
+        for path in learnt.recorded:
+            panel.plot(*path.T, color=DIRECT, linewidth=0.6)
+        panel.plot(*stability.goal, "o", color=TRUE, markersize=3)
+        panel.set(xticks=(), yticks=(), aspect="equal")
+        panel.set_title(shape, fontsize=8)
+    return figure
+
+
+@dataclass(frozen=True)
+class _Learnt:
+    """A shape, learnt from some of its demonstrations."""
+
+    plain: Policy
+    stable: Policy
+    held_out: Demonstrations
+    recorded: list[np.ndarray]
+    duration: float
+
+    @property
+    def begins(self) -> np.ndarray:
+        """Where demonstrations begin, (7, n)."""
+        return np.stack([path[0] for path in self.recorded])
+
+    @property
+    def size(self) -> float:
+        """The longer side of the box that holds all demonstrations."""
+        return float(np.ptp(np.vstack(self.recorded), axis=0).max())
+
+    def grid(self, count: int) -> np.ndarray:
+        """Spread states over that box, enlarged, (count², 2)."""
+        low, high = (edge(np.vstack(self.recorded), axis=0) for edge in (np.min, np.max))
+        margin = (INFLATED - 1.0) / 2 * (high - low)
+        axes = [np.linspace(a, b, count) for a, b in zip(low - margin, high + margin, strict=True)]
+        return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(low))
+
+
+def _learn(folder: Path, shape: str, repetition: int) -> _Learnt:
+    path = folder / "handwriting" / f"{shape}.mat"
+    pairs = load_demonstrations(path, "demos", transposed=True)
+    times = _load_times(path)
+    order = np.random.default_rng(repetition).permutation(len(pairs))
+    train, held_out = (join([pairs[i] for i in which]) for which in (order[:SHOWN], order[SHOWN:]))
+    train = replace(train, time=np.concatenate([times[i] for i in order[:SHOWN]]))
+    plain = LocallyLinearPolicy().fit(train)
+    duration = max(float(t[-1]) for t in times)
+    return _Learnt(plain, plain.stabilized("end", train), held_out, [X for X, _ in pairs], duration)
 
 
 def _follow(policy: Policy, starts: np.ndarray, steps: int, size: float) -> tuple[float, float, int]:

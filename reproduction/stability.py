@@ -26,6 +26,9 @@ PATHS = 6
 ARRIVED = 0.01
 """Share of the box's longer side within which a movement has to end."""
 
+FAR = 0.1
+"""Share of that side beyond which a state is far from the goal."""
+
 DT, LONGEST = 0.02, 10.0
 """Seconds a step, and how long a movement may take, in durations of the longest demonstration."""
 
@@ -42,12 +45,15 @@ class Row:
         How many movements were begun.
     plain, stable : float
         Share of them that end at the goal.
+    off : float
+        Half of the plain movements end farther from the goal than this, mm.
     latest : float
         When the last of the stabilised movements arrives, in durations of the longest demonstration.
     plain_error, stable_error : float
         Root mean square of the velocity's error on held-out demonstrations, mm/s.
-    change : float
-        Root mean square of what stabilising changes of the velocity there, mm/s.
+    change, far_change : float
+        Root mean square of what stabilising changes of the velocity there, mm/s; and where that is farther from the
+        goal than 10 % of the box's longer side.
     speed : float
         Root mean square of the velocity there, mm/s.
     rises : int
@@ -58,10 +64,12 @@ class Row:
     starts: int
     plain: float
     stable: float
+    off: float
     latest: float
     plain_error: float
     stable_error: float
     change: float
+    far_change: float
     speed: float
     rises: int
 
@@ -93,16 +101,20 @@ def measure(folder: Path, shape: str, repetition: int) -> Row:
     starts = np.vstack([learnt.grid(GRID), learnt.begins])
     steps = int(LONGEST * learnt.duration / DT)
     ends, latest, rises = _follow(stable, starts, steps, learnt.size)
+    off = _end(plain, starts, steps, learnt.size)
+    far = np.linalg.norm(held_out.states, axis=1) > FAR * learnt.size
     own, changed = (policy.predict(held_out.states) for policy in (plain, stable))
     return Row(
         shape=shape,
         starts=len(starts),
-        plain=_arrive(plain, starts, steps, learnt.size),
+        plain=float(np.mean(off <= ARRIVED * learnt.size)),
         stable=ends,
+        off=float(np.median(off)),
         latest=latest / learnt.duration,
         plain_error=_root_mean_square(own - held_out.actions),
         stable_error=_root_mean_square(changed - held_out.actions),
         change=_root_mean_square(changed - own),
+        far_change=_root_mean_square((changed - own)[far]),
         speed=_root_mean_square(held_out.actions),
         rises=rises,
     )
@@ -119,10 +131,12 @@ def merge(name: str, rows: list[Row]) -> Row:
         starts=sum(row.starts for row in rows),
         plain=mean("plain"),
         stable=mean("stable"),
+        off=mean("off"),
         latest=max(row.latest for row in rows),
         plain_error=mean("plain_error"),
         stable_error=mean("stable_error"),
         change=mean("change"),
+        far_change=mean("far_change"),
         speed=mean("speed"),
         rises=sum(row.rises for row in rows),
     )
@@ -145,10 +159,12 @@ def tabulate(rows: list[Row]) -> str:
             "starts",
             "reach the goal: plain",
             "stabilised",
+            "plain ends off by",
             "the last after",
             "held-out error: plain",
             "stabilised",
             "changed by",
+            "far from the goal",
             "of speed",
             "steps on which V rose",
         ),
@@ -158,10 +174,12 @@ def tabulate(rows: list[Row]) -> str:
                 f"{row.starts}",
                 f"{row.plain:.1%}",
                 f"{row.stable:.1%}",
+                f"{row.off:.1f}",
                 f"{row.latest:.1f}",
                 f"{row.plain_error:.2f}",
                 f"{row.stable_error:.2f}",
                 f"{row.change:.2f}",
+                f"{row.far_change:.2f}",
                 f"{row.speed:.1f}",
                 f"{row.rises}",
             )
@@ -261,14 +279,13 @@ def _follow(policy: Policy, starts: np.ndarray, steps: int, size: float) -> tupl
     return float(np.mean(~outside[:, -1])), DT * (last[-1] + 1) if len(last) else 0.0, rises
 
 
-def _arrive(policy: Policy, starts: np.ndarray, steps: int, size: float) -> float:
-    """Return the share of starts from which a policy that may diverge ends at the goal."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        X = starts
-        for _ in range(steps):
-            going = np.linalg.norm(X, axis=1) < 100 * size
-            X = np.where(going[:, None], X + DT * policy.predict(np.where(going[:, None], X, 0.0)), X)
-    return float(np.mean(np.linalg.norm(X, axis=1) <= ARRIVED * size))
+def _end(policy: Policy, starts: np.ndarray, steps: int, size: float) -> np.ndarray:
+    """Return how far from the goal a policy that may diverge ends; none is followed beyond 100 times the size."""
+    X = starts
+    for _ in range(steps):
+        going = np.linalg.norm(X, axis=1, keepdims=True) < 100 * size
+        X = np.where(going, X + DT * policy.predict(np.where(going, X, 0.0)), X)
+    return np.linalg.norm(X, axis=1)
 
 
 def _load_times(path: Path) -> list[np.ndarray]:

@@ -38,5 +38,5 @@ def test_mistakes(tmp_path, capsys):
 
 def test_the_page_has_the_table_of_what_the_command_prints():
     page = (Path(__file__).parents[2] / "docs" / "stability.md").read_text(encoding="utf-8")
-    row = stability.Row("x", 1, 0.0, 1.0, 1.0, 1.0, 1.0, 0.1, 10.0, 0)
+    row = stability.Row("x", 1, 0.0, 1.0, 5.0, 1.0, 1.0, 1.0, 0.1, 0.1, 10.0, 0)
     assert stability.tabulate([row]).splitlines()[0] in page

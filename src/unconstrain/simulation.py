@@ -178,10 +178,12 @@ def simulate(
     x = _checked_start(start, getattr(policy, "n_features_in_", None))
     space = getattr(policy, "space_", None) or Numbers(x.shape[1])
     scale = getattr(policy, "scale_", None)
-    # What makes a policy stable has to know the constraint; what projects its action afterwards would undo it.
-    under: Any = None
+    under = None
     if getattr(policy, "stability_", None) is not None:
-        under = getattr(policy, "predict_constrained", None)
+        # A stabilised policy has to know the constraint, and the step: what changes its actions later undoes them.
+        stable: Any = policy
+        stable = stable.held_for(dt)
+        predict, under = stable.predict, stable.predict_constrained
     # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(samples):

@@ -12,6 +12,7 @@ import unconstrain as uc
 from tests.policies.test_spaces import reaches
 from unconstrain.constraints.nullspace import projection
 from unconstrain.errors import DataError, PolicyError
+from unconstrain.simulation import rollout
 from unconstrain.spaces import Numbers, Pose, SecondOrder
 
 RNG = np.random.default_rng(0)
@@ -85,7 +86,7 @@ def test_the_goal_is_an_equilibrium_that_every_rollout_reaches(name):
     assert not stable.predict(GOAL[None]).any()
     starts = np.stack(np.meshgrid(*[np.linspace(-1.2, 1.2, 7)] * 2), axis=-1).reshape(-1, 2)
     for dt in (0.005, 0.02, 0.1):
-        movement = stable.rollout(starts, steps=int(40 / dt), dt=dt)
+        movement = rollout(stable, starts, int(40 / dt), dt)
         values = stable.stability_.value(movement.states).reshape(len(starts), -1)
         assert np.all(np.diff(values, axis=1) <= 0)
         ends = movement.states.reshape(len(starts), -1, 2)[:, -1]

@@ -4,6 +4,7 @@ import warnings
 from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
+from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
@@ -306,7 +307,7 @@ class Policy(RegressorMixin, BaseEstimator):
         U : ndarray of shape (N, d)
             Or (N,), where the policy was fitted to actions of that shape.
         spread : ndarray of shape (N, d) or (N, d, d)
-            Where asked for; see `fitting.posterior`.
+            Where asked for; see `fitting.posterior`. Of a stabilised policy, that of the policy it was made of.
 
         Raises
         ------
@@ -407,6 +408,25 @@ class Policy(RegressorMixin, BaseEstimator):
         stable = copy(self)
         stable.stability_ = learn_stability(self._without_stability(), goal, demos, hold)
         return stable
+
+    def held_for(self, seconds: float) -> Self:
+        """Return this policy for actions that are held for a time, where that is longer than it was made stable for.
+
+        Parameters
+        ----------
+        seconds : float
+            Above zero.
+
+        Returns
+        -------
+        Policy
+            This one where it is not stabilised, or for as long already.
+        """
+        if self.stability_ is None or seconds <= self.stability_.hold:
+            return self
+        slower = copy(self)
+        slower.stability_ = replace(self.stability_, hold=float(seconds))
+        return slower
 
     def posterior(self) -> Posterior:
         """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
@@ -612,11 +632,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         from unconstrain.simulation import rollout
 
-        policy = self
-        if self.stability_ is not None:
-            policy = copy(self)
-            policy.stability_ = self.stability_.held_for(dt)
-        return rollout(policy, start, steps, dt, constraint, stop_when=stop_when)
+        return rollout(self, start, steps, dt, constraint, stop_when=stop_when)
 
     def save(self, path: str | PathLike[str], *, resumable: bool = False) -> None:
         """Write the policy to a file that `load_policy` reads. Nothing in it is code.

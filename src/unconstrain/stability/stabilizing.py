@@ -1,6 +1,6 @@
 """The smallest change of an action that makes a Lyapunov function fall, in closed form."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -197,11 +197,6 @@ class Stability:
     def distance(self, X: Array) -> Array:
         """Compute how far states (N, n) are from the goal, as a share of the extent of those learnt from, (N,)."""
         return np.linalg.norm(self._from_goal(X), axis=1) / self.extent
-
-    def held_for(self, seconds: float) -> Self:
-        """Return the same for actions that are held for a time, where that is longer."""
-        is_longer = isinstance(seconds, float | int) and np.isfinite(seconds) and seconds > self.hold
-        return replace(self, hold=float(seconds)) if is_longer else self
 
     def _from_goal(self, X: Array) -> Array:
         return self.space.difference(np.tile(self.goal, (len(X), 1)), X) / self.scale

@@ -195,11 +195,16 @@ def test_the_end_is_the_mean_of_the_last_states(poses):
     assert f"ends {apart:.3g} from it" in stability.notes[0]
 
 
-def test_without_demonstrations_the_centres_say_where_the_policy_was_learnt():
+def test_without_demonstrations_the_centres_say_where_the_policy_was_learnt(poses):
     for name in ("local", "rbf"):
         stable = PLAIN[name].stabilized(GOAL)
         end = stable.rollout([-0.9, 0.9], steps=2000, dt=0.02).states[-1]
         assert np.linalg.norm(end - GOAL) < 0.01
+    plain, _, away = poses
+    states = (
+        plain.stabilized(Pose().origin).rollout(away[:5], steps=1000, dt=0.02).states.reshape(5, -1, 7)[:, -1]
+    )
+    assert np.abs(Pose().difference(np.tile(Pose().origin, (5, 1)), states)).max() < 0.01
     linear = uc.ParametricPolicy(risk="direct").fit(X, U)
     with pytest.raises(PolicyError, match="give the demonstrations"):
         linear.stabilized(GOAL)

@@ -139,16 +139,28 @@ def _find_states(policy: "Policy", demos: "Demonstrations | ArrayLike") -> np.nd
 
 
 def _find_centers(policy: "Policy") -> np.ndarray:
-    """Return the centres that a policy was learnt about."""
+    """Return the centres that a policy was learnt about, as states."""
     features = policy.model_.features
     for holder in (policy, features, getattr(features, "transformer_", None)):
         centers = getattr(holder, "centers_", None)
-        if centers is not None and policy.space_.is_flat:
-            return np.asarray(centers, dtype=np.float64)
+        if centers is not None:
+            found = _from_layout(policy, np.asarray(centers, dtype=np.float64))
+            if found is not None:
+                return found
     raise PolicyError(
         "this policy does not hold the states that it was learnt over, which say where it has to be made stable: give "
         "the demonstrations, stabilized(goal, demos), or fit with --stable-at on the command line"
     )
+
+
+def _from_layout(policy: "Policy", Z: np.ndarray) -> np.ndarray | None:
+    """Return the states that a space lays out as Z (M, m); None where it lays them out otherwise than as ways there."""
+    space, base = policy.space_, getattr(policy.model_, "base", None)
+    if space.is_flat:
+        return Z
+    if base is None or np.isnan(base).any() or Z.shape[1] != space.n_actions:
+        return None
+    return space.step(np.tile(base, (len(Z), 1)), Z, 1.0)
 
 
 def _check_goal(goal: Any, space: Space) -> np.ndarray:

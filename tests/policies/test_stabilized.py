@@ -243,3 +243,12 @@ def test_mistakes():
         uc.ParametricPolicy(space=second, risk="direct").fit(X, U[:, :1]).stabilized([0, 0], X)
     with pytest.raises(PolicyError, match="only a policy whose actions are velocities"):
         uc.ParametricPolicy(risk="direct").fit(X, U[:, :1]).stabilized(GOAL, X)
+
+
+def test_units_and_origin_do_not_matter():
+    away = GOAL + RNG.normal(size=(100, 2))
+    unit, origin = 1024.0, np.array([512.0, -4096.0])
+    other = uc.LocallyLinearPolicy(n_centers=15, risk="direct").fit(X * unit + origin, U * unit)
+    moved = other.stabilized(GOAL * unit + origin, X * unit + origin).predict(away * unit + origin) / unit
+    expected = STABLE["local"].predict(away)
+    assert np.abs(moved - expected).max() < 1e-4 * np.abs(expected).max()

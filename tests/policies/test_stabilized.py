@@ -238,6 +238,12 @@ def test_mistakes():
         policy.stabilized("end", X)
     with pytest.raises(PolicyError, match="hold must be a finite number above zero"):
         policy.stabilized(GOAL, X, hold=0)
+    with pytest.raises(PolicyError, match="hold must be at most"):
+        policy.stabilized(GOAL, X, hold=1e300)
+    with pytest.raises(DataError, match="no distance to compute with"):
+        policy.stabilized([1e200, 0], X)
+    with pytest.raises(DataError, match="all states are at the goal"):
+        policy.stabilized(GOAL, GOAL[None])
     second = SecondOrder(Numbers(1))
     with pytest.raises(PolicyError, match="whose actions are accelerations cannot be stabilised"):
         uc.ParametricPolicy(space=second, risk="direct").fit(X, U[:, :1]).stabilized([0, 0], X)

@@ -1,11 +1,9 @@
 """The Lyapunov function itself: one critical point, a right gradient, and steps over which it falls."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from unconstrain.errors import DataError
 from unconstrain.stability import Lyapunov, learn_lyapunov
 
 seeds = st.integers(0, 2**32 - 1)
@@ -88,8 +86,3 @@ def test_parts_that_are_no_plain_numbers_are_round():
     assert not V.matrices[0, :2, 2:].any()
     assert not V.matrices[1:, 2:].any()
     assert not V.matrices[1:, :, 2:].any()
-
-
-def test_states_that_are_all_at_the_goal_are_a_mistake():
-    with pytest.raises(DataError, match="all states are at the goal"):
-        learn_lyapunov(np.zeros((5, 2)), np.ones((5, 2)), np.zeros((5, 2)), ((2, True),))

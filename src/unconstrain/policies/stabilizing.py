@@ -24,6 +24,9 @@ HOLD = 0.02
 UNCHANGED = 1e-9
 """Share of an action's length below which a change of it is rounding."""
 
+LONGEST_HOLD = 1e6
+"""Seconds."""
+
 MEAN_PASSES = 10
 """Of the mean of states that are no plain numbers; each takes off all but the square of what is left."""
 
@@ -71,6 +74,8 @@ def learn_stability(
     if hold is None:
         hold = _find_step(demos) if isinstance(demos, Demonstrations) else HOLD
     hold = check_number(hold, "hold", positive=True)
+    if hold > LONGEST_HOLD:
+        raise PolicyError(f"hold must be at most {LONGEST_HOLD:g} seconds, got {hold:g}")
     U = np.reshape(policy.predict(X), (len(X), -1))
     stability = Stability.learn(space, at, policy.scale_, X, U, hold)
     notes = [_describe_change(stability, X, U)]

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from unconstrain.errors import DataError
 from unconstrain.stability.lyapunov import Array, Lyapunov
 
 N_TERMS = 3
@@ -43,7 +42,7 @@ def learn_lyapunov(
     Parameters
     ----------
     E : ndarray of shape (N, d)
-        From the goal to the states.
+        From the goal to the states, not all zero.
     U : ndarray of shape (N, d)
         Actions there.
     wanted : ndarray of shape (N, d)
@@ -60,19 +59,12 @@ def learn_lyapunov(
     -------
     Lyapunov
         In units of E.
-
-    Raises
-    ------
-    DataError
-        All states are at the goal.
     """
     from scipy.optimize import minimize
 
     chosen = np.linspace(0, len(E) - 1, min(len(E), N_STATES)).round().astype(int)
     E, U, wanted = E[chosen], U[chosen], wanted[chosen]
     length, speed = (float(np.sqrt(np.mean(np.sum(A**2, axis=1)))) for A in (E, U))
-    if not length > 0:
-        raise DataError("all states are at the goal, so there is no way to it to learn: give another goal")
     d = E.shape[1]
     flat = np.repeat([is_flat for _, is_flat in blocks], [count for count, _ in blocks])
     n_terms = n_terms if flat.any() else 0

@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 
 from unconstrain.constraints.nullspace import in_metric
-from unconstrain.errors import PolicyError
+from unconstrain.errors import DataError, PolicyError
 from unconstrain.spaces import SecondOrder, Space
 from unconstrain.stability.learning import learn_lyapunov
 from unconstrain.stability.lyapunov import Array, Lyapunov
@@ -22,6 +22,9 @@ SLOWING = 5.0
 
 ARRIVED = 0.01
 """Share of the states' extent within which a movement has reached the goal."""
+
+FARTHEST = 1e100
+"""The longest way to the goal of which powers are numbers in double precision; its inverse is the shortest."""
 
 BLOCKED = 1e-12
 """Share of the squared slope of V below which what a constraint leaves of it is rounding."""
@@ -98,7 +101,7 @@ class Stability:
         PolicyError
             Actions are not velocities of the state.
         DataError
-            All states are at the goal.
+            All states are at the goal, or too far from it or too near to compute with.
         """
         if isinstance(space, SecondOrder):
             raise PolicyError(
@@ -112,6 +115,16 @@ class Stability:
             )
         E = space.difference(np.tile(goal, (len(X), 1)), X) / scale
         U = U / scale
+        largest = float(np.abs(E).max(initial=0.0))
+        if not largest:
+            raise DataError(
+                "all states are at the goal, so there is no way to it to learn: give another goal"
+            )
+        if largest > FARTHEST or 0 < largest < 1 / FARTHEST:
+            raise DataError(
+                f"the states are {largest:.2g} from the goal, which is no distance to compute with: give another goal, "
+                "or states in another unit"
+            )
         away, speeds = np.linalg.norm(E, axis=1), np.linalg.norm(U, axis=1)
         size = float(np.sqrt(np.mean(away**2)))
         radius = RADIUS * size

@@ -182,7 +182,12 @@ class Stability:
 
     def rate(self, away: Any) -> Any:
         """Compute the rate of the slowest approach at distances, 1/s."""
-        return self.pace / np.maximum(away, SLOWING * self.radius)
+        return self.pace / np.maximum(away, self.slowing)
+
+    @property
+    def slowing(self) -> float:
+        """The distance from the goal from which on the least speed becomes less."""
+        return SLOWING * self.radius
 
     def freedom(self, X: Array, projections: Array) -> Array:
         """Compute how much of the steepest way down V a constraint leaves.

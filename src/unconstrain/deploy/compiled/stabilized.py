@@ -4,7 +4,7 @@ from math import sqrt
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy import ndarray
+from numpy import maximum, ndarray
 from numpy.typing import ArrayLike
 
 from unconstrain.deploy.compiled.base import CompiledPolicy
@@ -132,47 +132,46 @@ class Stabilized(CompiledPolicy):
         P, d = arrays["matrices"], self.n_actions
         linear = np.einsum("lij,lj->li", P[1:], arrays["offsets"])
         scale = None if (arrays["scale"] == 1.0).all() else arrays["scale"].copy()
-        return arrays["goal"].copy(), scale, P.reshape(-1, d).copy(), P.shape[:2], linear
+        stability = self.stability
+        numbers = (stability.radius, stability.pull, stability.pace, stability.slowing, stability.hold)
+        return arrays["goal"].copy(), scale, P.reshape(-1, d).copy(), P.shape[:2], linear, numbers
 
     def _single(self, x: ndarray, own: ndarray) -> ndarray:
-        """Change one action (d,), as `Stability.stabilize` does many."""
-        goal, scale, stacked, shape, linear = self._parts
+        """Change one action (d,), as `Stability.stabilize` does many; so few terms are faster added in Python."""
+        goal, scale, stacked, shape, linear, numbers = self._parts
+        radius, pull, pace, slowing, hold = numbers
         e, u = x - goal, own
         if scale is not None:
             e, u = e / scale, own / scale
-        squared = e.dot(e)
+        squared = float(e.dot(e))
         if not squared < FAR:
             return self._generally(x, own)
-        stability = self.stability
         away = sqrt(squared)
-        if away < stability.radius:
-            inside = away / stability.radius
+        if away < radius:
+            inside = away / radius
             share = inside * inside * (3.0 - 2.0 * inside)
-            u = share * u - ((1.0 - share) * stability.pull) * e
+            u = share * u - ((1.0 - share) * pull) * e
         products = stacked.dot(e).reshape(shape)
         slopes = products[1:] - linear
         parts = slopes.dot(e)
-        np.maximum(parts, 0.0, out=parts)
+        maximum(parts, 0.0, out=parts)
         slopes += products[1:]
         gradient = parts.dot(slopes)
         gradient += products[0]
-        steepness = gradient.dot(gradient)
-        needed = gradient.dot(u) + stability.rate(away) * gradient.dot(e)
+        needed = float(gradient.dot(u)) + pace / max(away, slowing) * float(gradient.dot(e))
+        steepness = float(gradient.dot(gradient))
         if needed > 0.0 and steepness > 0.0:
             u = u - (needed / steepness) * gradient
-        step = stability.hold * u
-        curved = stacked.dot(step).reshape(shape).dot(step)
-        falls = -2.0 * gradient.dot(step)
-        bound = 2.0 * curved[0]
-        if shape[0] > 1:
-            curved = curved[1:]
-            first = slopes.dot(step)
-            last = parts + first + curved
-            np.maximum(last, 0.0, out=last)
-            steep = np.maximum(np.abs(first), np.abs(first + 2.0 * curved))
-            top = np.maximum(parts, last)
-            bound += 2.0 * (steep * steep).dot(top > 0.0) + 4.0 * top.dot(curved)
-        if falls < bound:
+        step = hold * u
+        falls = -2.0 * float(gradient.dot(step))
+        quadratic, *curved = stacked.dot(step).reshape(shape).dot(step).tolist()
+        bound = 2.0 * quadratic
+        for part, first, bend in zip(parts.tolist(), slopes.dot(step).tolist(), curved, strict=True):
+            last = part + first + bend
+            if part > 0.0 or last > 0.0:
+                steep = max(abs(first), abs(first + 2.0 * bend))
+                bound += 2.0 * steep * steep + 4.0 * max(part, last) * bend
+        if bound > 0.0 and falls < bound:
             u = u * max(falls / bound, 0.0)
         return u if scale is None else u * scale
 

@@ -36,9 +36,18 @@ def described(module: str) -> Iterator[str]:
         members = [value for name, value in inspect.getmembers(thing) if not name.startswith("_")]
         for each in [thing, *members] if inspect.isclass(thing) else [thing]:
             each = getattr(each, "fget", each)
+            if points_to_base(thing, each):
+                continue
             ours = str(getattr(each, "__module__", "")).startswith("unconstrain")
             if ours and (inspect.isclass(each) or inspect.isroutine(each)):
                 yield f"{each.__module__}.{each.__qualname__}"
+
+
+def points_to_base(cls: object, method: object) -> bool:
+    """Whether a method says what it does, and for the rest names that of a base class, which is checked."""
+    name, text = getattr(method, "__name__", ""), getattr(method, "__doc__", None) or ""
+    bases = inspect.getmro(cls)[1:] if inspect.isclass(cls) else ()
+    return any(text.endswith(f"ee `{base.__name__}.{name}`.") and name in vars(base) for base in bases)
 
 
 def public() -> list[str]:

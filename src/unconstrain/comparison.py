@@ -89,7 +89,7 @@ def compare_risks(
     policy : Policy or None
         What to fit; it is cloned. With None, `select_policy` chooses among its own candidates first.
     X : array_like of shape (N, n), or Demonstrations
-        States. Demonstrations bring their actions and their space.
+        States. Demonstrations bring their actions, episodes, known projections, space and noise.
     U : array_like of shape (N, d)
         Actions.
     groups : array_like of shape (N,), optional

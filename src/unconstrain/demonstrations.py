@@ -55,6 +55,9 @@ class Demonstrations:
         1 where the demonstrator says that nothing constrained the motion, else 0.
     space : Space, optional
         What states are: see `unconstrain.spaces`. By default numbers.
+    noise : float, optional
+        Standard deviation of the actions' noise, in their unit, where it is known. `load` finds it where states are
+        differentiated.
 
     Attributes
     ----------
@@ -63,6 +66,8 @@ class Demonstrations:
     episodes : ndarray of shape (N,), int64
         Codes 0 .. n_episodes - 1, fit to be passed as `groups=`.
     state_names, action_names, episode_labels, notes : tuple of str
+        As above.
+    noise : float or None
         As above.
 
     Raises
@@ -85,6 +90,7 @@ class Demonstrations:
     action_names: tuple[str, ...]
     episode_labels: tuple[str, ...]
     notes: tuple[str, ...]
+    noise: float | None
 
     def __init__(
         self,
@@ -101,6 +107,7 @@ class Demonstrations:
         forces: ArrayLike | None = None,
         free: ArrayLike | None = None,
         space: Space | None = None,
+        noise: float | None = None,
     ) -> None:
         X = _samples("states", states)
         U = _samples("actions", actions)
@@ -120,6 +127,7 @@ class Demonstrations:
             "action_names": _names("action_names", action_names, "u", d),
             "episode_labels": labels,
             "notes": tuple(_listed("notes", notes)),
+            "noise": None if noise is None else _noise(noise),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -345,6 +353,13 @@ class Demonstrations:
                 notes.append(f"left out {what}, which {missing} of {len(parts)} demonstrations do not have")
             return None
 
+        known = [(each.noise, len(each)) for each in several if each.noise is not None]
+        if 0 < len(known) < len(several):
+            notes.append(
+                f"left out noise, which {len(several) - len(known)} of {len(several)} demonstrations do not have"
+            )
+        squares, counts = np.array(known).reshape(-1, 2).T ** [[2], [1]]
+
         labels: dict[str, None] = {}  # an ordered set
         for label in (label for each in several for label in each.episode_labels):
             distinct, number = label, 1
@@ -366,6 +381,7 @@ class Demonstrations:
             action_names=first.action_names,
             episode_labels=tuple(labels),
             notes=tuple(dict.fromkeys(notes)),
+            noise=float(np.sqrt(np.average(squares, weights=counts))) if len(known) == len(several) else None,
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -423,6 +439,13 @@ class Demonstrations:
             *([_count(len(self.notes), "note")] if self.notes else []),
         ]
         return printable(f"Demonstrations({'; '.join(parts)})")
+
+
+def _noise(value: float) -> float:
+    (number,) = _numbers("noise", value).flat if np.ndim(value) == 0 else (-1.0,)
+    if number < 0:
+        raise DataError(f"noise must be a number of at least zero, got {quote(value)}")
+    return float(number)
 
 
 def _numbers(what: str, values: ArrayLike) -> Array:

@@ -49,10 +49,11 @@ def arrays_of(demos: "Demonstrations") -> dict[str, NDArray[Any]]:
 
 
 def describe(demos: "Demonstrations", roles: dict[str, Any]) -> dict[str, Any]:
-    """Return what a file says of its columns: their roles, and the names that demonstrations have."""
+    """Return what a file says of its columns: their roles, and the names and the noise that demonstrations have."""
     names = {name: list(getattr(demos, name)) for name in NAMES}
     space = {} if demos.space.is_flat else {"space": demos.space.describe()}
-    return {"format": FORMAT, **names, **space, "roles": roles}
+    noise = {} if demos.noise is None else {"noise": demos.noise}
+    return {"format": FORMAT, **names, **space, **noise, "roles": roles}
 
 
 def columns_of(demos: "Demonstrations") -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:

@@ -228,7 +228,7 @@ def select_policy(
         Policies in a list are named after themselves, in a dict by their keys; "auto" stands for those that
         `candidates(n, d)` makes. They are cloned, never changed.
     X : array_like of shape (N, n), or Demonstrations
-        States. Demonstrations bring their actions, episodes and known projections.
+        States. Demonstrations bring their actions, episodes, known projections and noise.
     U : array_like of shape (N, d)
         Actions.
     groups : array_like of shape (N,), optional
@@ -264,11 +264,11 @@ def select_policy(
     """
     import joblib
 
-    space = X.space if isinstance(X, Demonstrations) else None
+    known = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
     states, U, groups, projections = unpack_demonstrations(X, U, groups, projections)
     X, U = check_samples(ParametricPolicy(), states, U, reset=True, min_samples=2)
     actions, groups = check_actions(U), check_groups(groups, len(X))
-    named = _in_space(_name_candidates(candidates, X.shape[1], actions.shape[1]), space)
+    named = _told(_name_candidates(candidates, X.shape[1], actions.shape[1]), *known)
     if projections is not None:
         projections = check_projections(projections, *actions.shape, unknown=True)
         check_lets_through(projections, actions)
@@ -306,14 +306,17 @@ def select_policy(
     return Selection(policies[rows[0].name], rows[0].name, Table(tuple(rows), judge.measure), policies)
 
 
-def _in_space(named: dict[str, Policy], space: Space | None) -> dict[str, Policy]:
-    """Tell candidates that do not know it what the states of demonstrations are."""
-    if space is None or space.is_flat:
-        return named
-    return {
-        name: policy if policy.space is not None else clone(policy).set_params(space=space)
-        for name, policy in named.items()
-    }
+def _told(named: dict[str, Policy], space: Space | None, noise: float | None) -> dict[str, Policy]:
+    """Tell candidates that do not know it what the states of demonstrations are, and the noise of their actions."""
+    told = {}
+    for name, policy in named.items():
+        more: dict[str, Any] = {}
+        if policy.space is None and space is not None and not space.is_flat:
+            more["space"] = space
+        if policy.noise is None and policy.scale is None and noise is not None:
+            more["noise"] = noise
+        told[name] = clone(policy).set_params(**more) if more else policy
+    return told
 
 
 @dataclass(frozen=True)

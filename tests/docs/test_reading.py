@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import json
 import re
 import shlex
 from pathlib import Path
@@ -34,7 +35,54 @@ def folder(tmp_path_factory):
     t = np.arange(200) / 50
     pos = np.stack([np.cos(t), np.sin(t)], axis=1)
     np.savez(place / "arrays.npz", t=t, pos=pos, vel=pos[:, ::-1] * [-1, 1])
+    write_texts(place, t[:40], pos[:40])
+    x = np.random.default_rng(0).normal(size=(200, 2)).cumsum(axis=0)
+    ends = np.array([50, 120, 200])
+    np.savez(place / "replay.npz", **{"data/state": x, "data/action": x, "meta/episode_ends": ends})
+    last = np.isin(np.arange(200), ends - 1)
+    np.savez(place / "d4rl.npz", observations=x, terminals=last & (np.arange(200) < 60), timeouts=last)
     return place
+
+
+def write_texts(place, t, pos):
+    """Write text as the programs of the table do."""
+
+    def table(header, rows, mark=",", footer=""):
+        return "\n".join([*header, *(mark.join(map(str, row)) for row in rows)]) + "\n" + footer
+
+    rows = [(f"{s:.3f}", f"{x:.5f}", f"{y:.5f}") for s, (x, y) in zip(t, pos, strict=True)]
+    half = table(["t,x,y"], rows)
+    streams = [(s / 100, f"{np.cos(s / 100):.5f}", "") for s in range(200)]
+    streams += [(s / 40 + 0.0003, "", f"{np.sin(s / 40):.5f}") for s in range(80)]
+    texts = {
+        "plotjuggler.csv": table(["__time,/pose/x,/pose/y"], sorted(streams)),
+        "restarts.csv": half + half + "Total,1,2\n",
+        "headers.csv": table(["time,hand,", ",x,y", "s,mm,mm"], rows),
+        "excel.csv": "\ufeff"
+        + table(["Zeit;x;y"], ((f"26.11.2026 14:03:0{s}", x, y) for s, x, y in rows), ";")
+        .replace(".", ",")
+        .replace("26,11,2026", "26.11.2026"),
+        "kuka.log": table(
+            ["ZeitInSec ZeitInNanoSec cartPos_X cartPos_Y"],
+            ((1_700_000_000 + int(float(s)), round(float(s) % 1 * 1e9), x, y) for s, x, y in rows),
+            " ",
+        ),
+        "qualisys.tsv": table(
+            ["NO_OF_FRAMES\t40", "FREQUENCY\t100", "MARKER_NAMES\thand"],
+            ((x, y, s) for s, x, y in rows),
+            "\t",
+        ),
+        "records.json": json.dumps(
+            {
+                "frames": [
+                    {"t": s, "pose": {"x": x, "y": y}}
+                    for s, (x, y) in zip(t.tolist(), pos.tolist(), strict=True)
+                ]
+            }
+        ),
+    }
+    for name, text in texts.items():
+        (place / name).write_text(text, encoding="utf-8")
 
 
 def say(words):

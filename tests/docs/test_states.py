@@ -31,6 +31,8 @@ def test_the_commands_print_what_the_page_says(tmp_path, capsys):
                 if " fit " in command:
                     shares.append(explained(printed))
         movement = np.loadtxt("cup-there.csv", delimiter=",", skiprows=1)
-    assert shares == re.findall(r"[\d.]+ %", "".join(re.findall(r"\n(?:The policy|The first) explains.*", PAGE)))
+    assert shares == re.findall(
+        r"[\d.]+ %", "".join(re.findall(r"\n(?:The policy|The first) explains.*", PAGE))
+    )
     assert np.allclose(np.linalg.norm(movement[:, 4:8], axis=1), 1.0)
     assert np.allclose(np.abs(movement[-1, 1:8]), [1, 2, 0, 0, 0, 0.7071, 0.7071], atol=1e-3)

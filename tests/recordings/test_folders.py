@@ -110,3 +110,10 @@ def test_mistakes_are_told_in_one_sentence(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(DataError, match="is a folder without Parquet files"):
         uc.load(tmp_path / "empty", state="x0")
+
+
+def test_a_zarr_store_is_named(tmp_path):
+    (tmp_path / "replay.zarr" / "data").mkdir(parents=True)
+    (tmp_path / "replay.zarr" / ".zgroup").write_text("{}")
+    with pytest.raises(DataError, match="is a Zarr store"):
+        uc.load(tmp_path / "replay.zarr", state="data/state")

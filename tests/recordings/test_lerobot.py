@@ -97,3 +97,25 @@ def test_files_come_in_the_order_of_their_numbers(tmp_path):
         uc.ParametricPolicy(alpha="cv"), uc.open(folder, state="x0", action="u0", episode="episode_index")
     )
     assert list(policy.resume().folds.fold_of) == np.unique(EPISODES).tolist()
+
+
+def test_an_episode_may_go_on_in_the_next_file(tmp_path):
+    import pyarrow.parquet as pq
+
+    folder = written.lerobot(tmp_path / "robot", X, U, EPISODES, TIME, "v3.0")
+    path = next((folder / "data").rglob("*.parquet"))
+    table = pq.read_table(path)
+    half = len(table) // 2 + 1
+    pq.write_table(table.slice(0, half), path)
+    pq.write_table(table.slice(half), path.with_name("file-999.parquet"))
+    assert uc.inspect(folder).episodes == uc.load(folder).n_episodes == 13
+
+
+def test_the_cache_of_the_hub_is_followed(tmp_path):
+    source = written.lerobot(tmp_path / "robot", X, U, EPISODES, TIME, "v3.0")
+    cache = tmp_path / "datasets--user--name"
+    (cache / "snapshots").mkdir(parents=True)
+    source.rename(cache / "snapshots" / "abc123")
+    (cache / "refs").mkdir()
+    (cache / "refs" / "main").write_text("abc123")
+    assert len(uc.load(cache)) == len(X)

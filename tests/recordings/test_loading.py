@@ -55,7 +55,12 @@ def test_actions_are_differentiated_where_none_are_given(tmp_path):
     assert demos.state_names == ("x", "y")
     assert demos.action_names == ("x_dot", "y_dot")
     assert demos.episode_labels == ("line",)
-    assert demos.notes == ("read: 60 samples, 1 episode, 1 file, 50 Hz, 1.18 s, time in s",)
+    assert demos.notes == (
+        "the states show no noise, so velocities are those of the fewest samples; window= smooths states over as many "
+        "seconds",
+        "read: 60 samples, 1 episode, 1 file, 50 Hz, 1.18 s, time in s",
+    )
+    assert load(tmp_path / "line.csv", state=["x", "y"], time="t", window=0.2).notes == demos.notes[1:]
 
 
 def test_action_columns_need_no_time(tmp_path):
@@ -208,10 +213,10 @@ def test_positions_that_mean_other_columns_elsewhere_are_told(tmp_path):
 )
 def test_units_of_time(tmp_path, stamps, unit):
     path = written(tmp_path / "a.csv", rows("t,x", stamps, TIME))
-    demos = load(path, state="x", time="t", time_unit=unit)
+    demos = load(path, state="x", time="t", time_unit=unit, window=0.2)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-6)
     guess = "a.csv: time is taken to be in ns, by its typical step of 2e+07"
-    assert [note.split(";")[0] for note in demos.notes[:-1]] == (
+    assert [note.split(";")[0] for note in demos.notes[:-1] if "noise" not in note] == (
         [guess] if stamps[0] == 0.0 and not unit else []
     )
     assert demos.notes[-1].startswith("read: 60 samples, 1 episode, 1 file, 50 Hz, 1.18 s, time in ")
@@ -230,7 +235,7 @@ def test_nanoseconds_lose_nothing(tmp_path):
 
 def test_a_doubtful_unit_is_noted(tmp_path):
     path = written(tmp_path / "a.csv", rows("t,x", (TIME * 1e3).astype(int), TIME))
-    note, _ = load(path, state="x", time="t").notes
+    note, _ = load(path, state="x", time="t", window=0.2).notes
     assert note == (
         "a.csv: time is taken to be in ms, by its typical step of 20; if that is wrong, give time_unit=, or rate= for "
         "the numbers of frames"
@@ -240,7 +245,7 @@ def test_a_doubtful_unit_is_noted(tmp_path):
 def test_a_gap_splits_and_short_fragments_go(tmp_path):
     time = np.concatenate([TIME, TIME[:3] + 5, TIME + 10])
     path = written(tmp_path / "a.csv", rows("t,x", time, time))
-    demos = load(path, state="x", time="t")
+    demos = load(path, state="x", time="t", window=0.2)
     assert demos.episode_labels == ("a/1", "a/2")
     assert demos.episodes.tolist() == [0] * 60 + [1] * 60
     assert demos.time[60] == pytest.approx(10)  # a fragment keeps its place in the recording
@@ -289,11 +294,11 @@ def test_the_recorded_circles():
     assert len(demos) == 3060 + 3012
     assert demos.episode_labels == ("planer_circle", "curve_circle")
     assert demos.state_names == ("x", "y", "z")
-    assert len(demos.notes) == 2
+    assert len(demos.notes) == 3
     assert demos.notes[0].startswith("planer_circle.csv: 6 steps more than 30 times faster")
 
     clean = load(files, state=[1, 2, 3], time="rosbagTimestamp", max_speed=1, min_duration=1)
-    assert clean.notes[:-1] == (
+    assert clean.notes[:-2] == (
         "planer_circle.csv: split at 6 steps faster than 1 per second",
         "planer_circle.csv: dropped 3 fragments (51 samples) shorter than 1 s",
     )

@@ -54,9 +54,13 @@ def mot(mark="\t"):
 @pytest.mark.parametrize(
     ("content", "time", "said"),
     [
-        (vicon(), "time", ["rate of the header, 10 Hz", "units are mm", "of its parts Trajectories is read"]),
-        (motive(), "Time (Seconds)", ["lengths are meters", "rotations are quaternion"]),
-        (trc(), "Time", ["units are mm"]),
+        (
+            vicon(),
+            "time",
+            ["rate of the header, 10 Hz", "of its parts 'Trajectories' is read", "LHand.Z in mm"],
+        ),
+        (motive(), "Time (Seconds)", []),
+        (trc(), "Time", ["LHand.X, LHand.Y, LHand.Z in mm"]),
         (mot(), "time", ["angles are in degrees"]),
         (mot("   "), "time", ["angles are in degrees"]),
     ],
@@ -64,7 +68,7 @@ def mot(mark="\t"):
 def test_header_blocks(tmp_path, content, time, said):
     path = tmp_path / "a.txt"
     path.write_text(content)
-    demos = uc.load(path, state="LHand", time=time)
+    demos = uc.load(path, state="LHand", time=time, window=0.3)
     assert demos.state_names == ("LHand.X", "LHand.Y", "LHand.Z")
     np.testing.assert_allclose(demos.states, HAND)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-9)
@@ -126,7 +130,7 @@ def test_c3d(tmp_path):
     np.testing.assert_allclose(demos.states, HAND, rtol=1e-6)
     np.testing.assert_allclose(demos.time, TIME, atol=1e-9)
     assert "10 Hz" in demos.notes[0]
-    assert "units are mm" in demos.notes[1]
+    assert "LHand.X, LHand.Y, LHand.Z in mm" in demos.notes[1]
     with pytest.raises(DataError, match=r"column 'RHand.X' is empty at row 4"):
         uc.load(tmp_path / "a.c3d", state="RHand", time="time")
 
@@ -137,3 +141,71 @@ def test_a_c3d_file_that_was_cut_is_one_sentence(tmp_path):
         (tmp_path / "b.c3d").write_bytes(whole[:length])
         with pytest.raises(DataError, match=r"b.c3d is damaged"):
             uc.load(tmp_path / "b.c3d", state="LHand", time="time")
+
+
+def qualisys(names, stamps):
+    head = "NO_OF_FRAMES\t30\nFREQUENCY\t10\nDATA_INCLUDED\t3D\nMARKER_NAMES\tLHand\tRHand\n"
+    if names:
+        axes = "\t".join(f"{hand} {axis}" for hand in ("LHand", "RHand") for axis in "XYZ")
+        head += f"{'Frame' + chr(9) + 'Time' + chr(9) if stamps else ''}{axes}\n"
+    return head + lines("\t", first=(range(1, 31), TIME.tolist()) if stamps else ())
+
+
+@pytest.mark.parametrize(("names", "stamps"), [(True, True), (True, False), (False, False)])
+def test_qualisys(tmp_path, names, stamps):
+    path = tmp_path / "a.tsv"
+    path.write_text(qualisys(names, stamps))
+    demos = uc.load(path, state=["LHand X", "LHand Y", "LHand Z"], time="Time" if stamps else None)
+    np.testing.assert_allclose(demos.states, HAND)
+    np.testing.assert_allclose(demos.time, TIME, atol=1e-9)
+    assert "LHand X, LHand Y, LHand Z in mm" in " ".join(demos.notes)
+    assert uc.inspect(path).columns[2 if stamps else 0].unit == "mm"
+
+
+def test_bodies_of_qualisys(tmp_path):
+    head = "NO_OF_FRAMES\t30\nFREQUENCY\t10\nDATA_INCLUDED\t6D\nBODY_NAMES\tTool\tCup\n"
+    head += "\t".join(f"{body} X\tY\tZ\tRoll\tPitch\tYaw" for body in ("Tool", "Cup")) + "\n"
+    body = "".join("\t".join(map(str, (*x, 0, 0, 0, *(x + 1), 0, 0, i))) + "\n" for i, x in enumerate(HAND))
+    (tmp_path / "a.tsv").write_text(head + body)
+    demos = uc.load(tmp_path / "a.tsv", state=["Cup X", "Cup Y", "Cup Yaw"])
+    np.testing.assert_allclose(demos.states[:, :2], HAND[:, :2] + 1)
+    assert "Cup X, Cup Y in mm; Cup Yaw in deg" in " ".join(demos.notes)
+
+
+def labview(columns):
+    end = "***End_of_Header***\n"
+    head = f"LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nX_Columns\t{columns}\n{end}\t\n"
+    segment = f"Channels\t3\t\t\nSamples\t30\t30\t30\nY_Unit_Label\tmm\tmm\tmm\nDelta_X\t0.1\t0.1\t0.1\n{end}"
+    segment += "X_Value\tpx\tpy\tpz\tComment\n"
+    times = TIME if columns == "One" else [""] * 30
+    segment += "".join("\t".join(map(str, (t, *x))) + "\n" for t, x in zip(times, HAND, strict=True))
+    return head + segment, segment
+
+
+@pytest.mark.parametrize("columns", ["One", "No"])
+def test_labview(tmp_path, columns):
+    path = tmp_path / "a.lvm"
+    whole, segment = labview(columns)
+    path.write_text(whole)
+    chosen = {"state": ["px", "py", "pz"], "time": "X_Value" if columns == "One" else None}
+    demos = uc.load(path, **chosen)
+    np.testing.assert_allclose(demos.states, HAND)
+    np.testing.assert_allclose(demos.time, TIME, atol=1e-9)
+    path.write_text(whole + "\n" + segment)
+    again = uc.load(path, **chosen)
+    assert again.n_episodes == 2
+    np.testing.assert_allclose(again.time, np.tile(TIME, 2), atol=1e-9)
+
+
+def test_eulers_of_motive_are_degrees(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(motive().replace("Quaternion", "XYZ").replace(",1,", ",1.5,", 9))
+    notes = " ".join(uc.load(path, state="RHand.RX", time="Time (Seconds)", drop="missing").notes)
+    assert "Euler angles in the order XYZ" in notes
+    assert "RHand.RX in deg" in notes
+
+
+def test_more_names_than_columns(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(vicon().replace(",,LHand,,,RHand,,", ",,LHand,,,RHand,,,,,More"))
+    np.testing.assert_allclose(uc.load(path, state="LHand").states, HAND)

@@ -120,15 +120,15 @@ def test_a_stream_places_its_model_among_relative_states(reaches):
 
 def test_an_episode_too_short_for_columns_that_move_is_named(tmp_path):
     t = np.arange(100) / 50
-    run = np.repeat([0, 1], [97, 3])
+    run = np.repeat([0, 1], [98, 2])
     path = tmp_path / "a.csv"
     rows = np.column_stack([run, t, np.sin(t), np.cos(t), np.cos(2 * t)])
     np.savetxt(path, rows, delimiter=",", header="run,t,x,u,g", comments="")
     given = {"state": "x", "action": "u", "time": "t", "episode": "run", "relative_to": "g"}
-    with pytest.raises(DataError, match=r"a.csv: episode '1.*' has 3 samples .* drop="):
+    with pytest.raises(DataError, match=r"a.csv: episode '1.*' has 2 samples .* drop="):
         uc.load(path, **given)
     demos = uc.load(path, **given, drop="short")
-    assert len(demos) == 97
+    assert len(demos) == 98
     assert "dropped 1 fragment" in " ".join(demos.notes)
 
 

@@ -394,3 +394,57 @@ def test_the_robot_that_drives():
     assert np.corrcoef(speed, told)[0, 1] > 0.9
     assert np.median(speed) == pytest.approx(np.median(told), rel=0.1)
     assert any("along the axes of the moving base_link" in note for note in driven.notes)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_messages_that_come_late_are_put_into_order(tmp_path, kind):
+    order = np.arange(60)
+    order[[20, 21, 40, 42]] = order[[21, 20, 42, 40]]
+
+    def fill(bag):
+        for place, i in enumerate(order):
+            bag.stamped_pose("/pose", START + 0.1 * i, circle(0.1 * i), received=START + 0.1 * place)
+
+    path = written(tmp_path, kind, fill)
+    demos = uc.load(path, state=XY)
+    np.testing.assert_allclose(demos.time, np.arange(60) * 0.1, atol=1e-6)
+    np.testing.assert_allclose(demos.states[:, 0], np.cos(demos.time), atol=1e-6)
+    assert any("messages of /pose came after later ones" in note for note in demos.notes)
+
+
+def test_a_clock_that_was_set_back_is_refused(tmp_path):
+    def fill(bag):
+        for i in range(80):
+            bag.stamped_pose("/pose", START + 0.1 * (i % 40), circle(0.1 * i), received=START + 0.1 * i)
+
+    with pytest.raises(DataError, match="goes back at message 40"):
+        uc.load(written(tmp_path, "mcap", fill), state=XY)
+
+
+def test_a_folder_of_bags_is_read_bag_by_bag(tmp_path):
+    def fill(bag):
+        for i in range(40):
+            bag.stamped_pose("/pose", START + 0.1 * i, circle(0.1 * i))
+
+    (tmp_path / "bags").mkdir()
+    for name in ("a", "b"):
+        whole = written(tmp_path, "mcap", fill, name)
+        shutil.copy(next(whole.glob("*.mcap")), tmp_path / "bags" / f"{name}.mcap")
+    demos = uc.load(tmp_path / "bags", state=XY)
+    assert demos.episode_labels == ("a", "b")
+    (tmp_path / "bags" / "other.csv").write_text("x\n1\n")
+    with pytest.raises(DataError, match=r"2 \.mcap.*1 \.csv"):
+        uc.load(tmp_path / "bags", state=XY)
+
+
+@pytest.mark.parametrize("kind", ["mcap", "db3"])
+def test_the_file_of_a_compressed_bag_is_read_too(tmp_path, kind):
+    from rosbags import rosbag2
+
+    bag = Writing(tmp_path / "run", kind)
+    bag._writer.set_compression(rosbag2.CompressionMode.FILE, rosbag2.CompressionFormat.ZSTD)
+    with bag:
+        for i in range(40):
+            bag.stamped_pose("/pose", START + 0.1 * i, circle(0.1 * i))
+    path = next((tmp_path / "run").glob("*.zst*"))
+    np.testing.assert_array_equal(uc.load(path, state=XY).states, uc.load(tmp_path / "run", state=XY).states)

@@ -77,7 +77,7 @@ def test_json_lines(tmp_path):
     [
         ('{"t": 1, "x": 2}\n{"t": oops\n', "a.jsonl cannot be read as JSON Lines"),
         ('{"t": 1, "x": 2}\n{"t": 2, "x": "a"}\n', "from number to string in row 1"),
-        ("[1, 2]\n", "a.jsonl is damaged or not JSON Lines"),
+        ("[1, 2]\n", "a.jsonl cannot be read as JSON Lines"),
         ('{"a":' * 5000, "a.jsonl"),
     ],
 )
@@ -90,7 +90,7 @@ def test_json_lines_that_are_damaged(tmp_path, content, sentence):
 def test_workbooks(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     FRAME.to_excel(tmp_path / "a.xlsx")
-    demos = uc.load(tmp_path / "a.xlsx", **TXY)
+    demos = uc.load(tmp_path / "a.xlsx", **TXY, window=0.2)
     np.testing.assert_array_equal(demos.states, X)
     assert ["counts the rows" in note for note in demos.notes[:-1]] == [True]
     book = openpyxl.Workbook()
@@ -105,7 +105,7 @@ def test_workbooks(tmp_path):
         demos = uc.load(tmp_path / "b.xlsx", state=["x", "y"], time=time)
         np.testing.assert_array_equal(demos.states, X)
         np.testing.assert_allclose(demos.time, TIME, atol=1e-6)
-    assert "of its sheets 'Sheet' is read" in demos.notes[0]
+    assert "of its parts 'Sheet' is read; part= names another one, of 'other'" in demos.notes[0]
     sheet["B10"] = "oops"
     book.save(tmp_path / "c.xlsx")
     with pytest.raises(DataError, match="column 'x' holds 'oops' at row 10"):
@@ -145,3 +145,22 @@ def test_what_actions_are_is_not_asked_of_demonstrations():
     demos = uc.load(FRAME, **TXY)
     with pytest.raises(DataError, match="action_is=target is about recorded actions"):
         uc.open(demos, action_is="target")
+
+
+def test_records_in_parquet_and_feather(tmp_path):
+    import pyarrow.feather
+    import pyarrow.parquet as pq
+
+    rows = [{"position": {"x": x, "y": y}, "both": [x, y]} for x, y in X]
+    table = pa.table({"t": TIME, "pose": pa.array(rows)})
+    pq.write_table(table, tmp_path / "a.parquet", row_group_size=7)
+    pyarrow.feather.write_feather(table, tmp_path / "a.feather")
+    for name in ("a.parquet", "a.feather"):
+        for state in ("pose.position", ["pose.position.x", "pose.position.y"], "pose.both"):
+            np.testing.assert_array_equal(uc.load(tmp_path / name, state=state, time="t").states, X)
+        blocks = uc.open(tmp_path / name, state="pose.position", time="t").blocks(5)
+        np.testing.assert_array_equal(np.concatenate([block.states for block in blocks]), X)
+    whole = (tmp_path / "a.feather").read_bytes()
+    (tmp_path / "a.feather").write_bytes(whole[:200])
+    with pytest.raises(DataError, match=r"a.feather is damaged or not a Feather"):
+        uc.load(tmp_path / "a.feather", state="pose.position", time="t")

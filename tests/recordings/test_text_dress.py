@@ -28,7 +28,7 @@ def table(header="t,x,y", mark=",", comma=False, end=""):
 def read(tmp_path, content, name="a.csv", **options):
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    demos = load(path, **(options or TXY))
+    demos = load(path, **(options or TXY), window=0.2)
     np.testing.assert_allclose(demos.states, X, atol=1e-9)
     return demos
 
@@ -68,7 +68,8 @@ def test_what_is_guessed_of_a_layout_is_noted(tmp_path):
     notes = read(tmp_path, "Log\n\n" + table("t,x,y\ns,mm,mm")).notes[:-1]
     assert notes == (
         "a.csv: line 1 is taken for a title, since the table begins after, and left out",
-        "a.csv: line 4 holds units, which are not converted: s, mm",
+        "a.csv: line 4 is taken for units: s, mm",
+        "a.csv: units are those of the file, and not converted: x, y in mm",
     )
 
 
@@ -131,7 +132,7 @@ def test_thousands_are_no_decimals(tmp_path, mark):
     mark = "," if mark == "quoted" else mark
     path = tmp_path / "a.csv"
     path.write_text(f"t{mark}x\n" + "".join(f"{i / 10}{mark}{cell}\n" for i, cell in enumerate(cells)))
-    demos = load(path, state="x", time="t")
+    demos = load(path, state="x", time="t", window=0.2)
     assert demos.states[:, 0].tolist() == numbers
     assert demos.notes[:-1] == ("a.csv: commas in numbers of column 'x' are read as setting off thousands",)
 

@@ -45,7 +45,9 @@ def test_the_size_of_an_epoch_decides(tmp_path, step, unit, ticks):
     demos = uc.load(path, state="x", time="t", window=10 * step)
     assert demos.time[-1] == pytest.approx(199 * step, rel=1e-3)
     assert read(demos).endswith(f"time in {unit}")
-    assert len(demos.notes) == 1
+    assert all(
+        "noise" in note for note in demos.notes[:-1]
+    )  # that of stamps rounded to the precision of a float
 
 
 @pytest.mark.parametrize(
@@ -65,7 +67,7 @@ def test_frame_numbers_are_not_seconds_in_silence(tmp_path):
     assert "give rate= or time_unit=" in noted(
         uc.load(path, state="x", time="frame", window=5), "goes up by 1"
     )
-    demos = uc.load(path, state="x", time="frame", rate=50)
+    demos = uc.load(path, state="x", time="frame", rate=50, window=0.2)
     np.testing.assert_allclose(demos.time, TIME)
     assert demos.notes == ("read: 200 samples, 1 episode, 1 file, 50 Hz, 3.98 s, time in frames",)
     ms = uc.load(path, state="x", time="frame", time_unit="ms", window=0.02)

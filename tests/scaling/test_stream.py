@@ -138,7 +138,7 @@ def test_episodes_too_broken_to_differentiate_are_left_out(tmp_path):
     time = TIME.copy()
     own = np.flatnonzero(np.isin(EPISODES, EPISODES[300]))
     time[own] += 5.0 * (np.arange(len(own)) // 3)
-    columns = COLUMNS | {"action": None, "time": "timestamp", "gap": 1.0}
+    columns = COLUMNS | {"action": None, "time": "timestamp", "gap": 1.0, "window": 0.2}
     written.write(tmp_path / "one", X, U, EPISODES, time, [])
     demos = uc.load(tmp_path / "one" / "part-0.parquet", **columns)
     whole = uc.ParametricPolicy(risk="inconsistency", alpha="cv").fit(

@@ -26,7 +26,7 @@ WAYS = {
     "lists": {"projections": "N"},
     "columns": {"projections": [f"n{j}" for j in range(9)]},
 }
-DERIVED = {"state": COLUMNS["state"], "time": "timestamp"}
+DERIVED = {"state": COLUMNS["state"], "time": "timestamp", "window": 0.2}
 
 
 def policies():
@@ -39,7 +39,7 @@ def policies():
 
 def in_memory(policy, files, columns, way):
     """The route by way of `load` and `from_recording`; of projections, which `load` does not read, the array."""
-    loaded = {name: columns.get(name) for name in ("state", "action", "time", "episode")}
+    loaded = {name: columns.get(name) for name in ("state", "action", "time", "episode", "window")}
     told = {name: WAYS[way].get(name) for name in ("force", "free")}
     demos = uc.load(files, **loaded, **told)
     known = N
@@ -258,7 +258,7 @@ LONG = pa.array([np.eye(3).ravel()[: 8 if i == 207 else 9] for i in range(len(X)
         ),
         ("N", LONG, "lists", "part-1.parquet: column 'N' holds a list of 8 at row 7 .* 9 numbers are needed"),
         ("n0", np.full(len(X), "a"), "columns", "part-0.parquet: column 'n0' holds 'a' at row 0"),
-        ("N", pa.array([{"a": 1.0}] * len(X)), "lists", "part-0.parquet: column 'N' holds struct"),
+        ("N", pa.array([{"a": 1.0}] * len(X)), "lists", "'N' stands for 1"),
         ("N", pa.array([[2.0] * 9] * len(X)), "lists", "part-0.parquet: the projection at row 0 .* is none"),
         ("f1", changed("f1", 207, np.nan), "force", "part-1.parquet: column 'f1' holds nan at row 7"),
         ("free", np.full(len(X), "yes"), "free", "part-0.parquet: column 'free' holds 'yes' at row 0"),

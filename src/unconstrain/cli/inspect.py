@@ -18,8 +18,12 @@ from unconstrain.progress import working
     is_flag=True,
     help="Print one JSON object: rows, episodes, rate_hz, duration_s, columns, notes, next.",
 )
+@click.option(
+    "--part",
+    help="Which part of a file: a sheet, a section of an export, a file of an archive, a set of demonstrations.",
+)
 @click.option("--keys", is_flag=True, help="Only list the columns, or the topics where a file has these.")
-def inspect(files: tuple[str, ...], as_json: bool, keys: bool) -> None:
+def inspect(files: tuple[str, ...], as_json: bool, part: str | None, keys: bool) -> None:
     """Show what is in recordings: columns and what they are, rate, duration, episodes, gaps, oddities.
 
     FILES are recordings in any format that `unconstrain fit` reads. What is printed last is a command that was tried
@@ -31,11 +35,11 @@ def inspect(files: tuple[str, ...], as_json: bool, keys: bool) -> None:
     from unconstrain.recordings import inspection
 
     if keys and not as_json:
-        for key in inspection.list_keys(files):
+        for key in inspection.list_keys(files, part):
             reporting.say(key)
         return
     with working("reading"):
-        found = inspection.inspect(files)
+        found = inspection.inspect(files, part)
     found = replace(found, notes=tuple(map(in_words_of_program, found.notes)))
     if as_json:
         reporting.say(json.dumps(found.to_dict(), allow_nan=False))

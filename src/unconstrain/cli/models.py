@@ -35,15 +35,17 @@ class Model:
     n_centers: int | None = None
     width: float | None = None
     scale: list[float] | str | None = None
+    noise: float | None = None
 
     def __post_init__(self) -> None:
         placed = list(self._placed())
         if self.name == "linear" and placed:
             raise PolicyError(f"the linear model has no centres: leave out {placed[0]}=")
-        chosen = placed or self.alpha != "cv" or self.risk != "adaptive" or self.scale is not None
-        if self.is_chosen and chosen:
+        chosen = placed or self.alpha != "cv" or self.risk != "adaptive"
+        if self.is_chosen and (chosen or not (self.scale is self.noise is None)):
             raise PolicyError(
-                "--model auto makes its own choices: leave out risk=, alpha=, centers=, n_centers=, width= and scale="
+                "--model auto makes its own choices: leave out risk=, alpha=, scale=, noise=, centers=, n_centers= and "
+                "width="
             )
 
     @property
@@ -57,7 +59,9 @@ class Model:
         from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy
 
         placed = self._placed()
-        shared: dict[str, Any] = {"risk": self.risk, "alpha": self.alpha, "scale": self.scale}
+        shared: dict[str, Any] = {
+            "risk": self.risk, "alpha": self.alpha, "scale": self.scale, "noise": self.noise
+        }  # fmt: skip
         if self.name == "linear":
             return ParametricPolicy(**shared)
         if self.name == "rbf":
@@ -95,6 +99,13 @@ model = gathered(
             default="cv",
             show_default=True,
             help='Weight decay λ: a number, or "cv" to choose it by cross-validation.',
+            section="Model",
+        ),
+        option(
+            "--noise",
+            type=Number(zero=True),
+            help="Standard deviation of the actions' noise, in their unit. By default, of actions that are "
+            "differentiated, what the states' noise leaves.",
             section="Model",
         ),
         option(

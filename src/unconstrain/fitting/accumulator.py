@@ -125,6 +125,9 @@ class Accumulator:
         For "adaptive": mean squared length of the actions, in squared units of the action.
     record : Record
         For "adaptive": how the belief was found.
+    noise : float
+        Variance of the actions' noise that is known beforehand, in squared units of the action; 0 where nothing is. For
+        "adaptive" the noise that is inferred is not below it; for "corrected" no more is taken away.
 
     Attributes
     ----------
@@ -149,6 +152,7 @@ class Accumulator:
         belief: Belief | None = None,
         scale: float = 1.0,
         record: Record | None = None,
+        noise: float = 0.0,
     ):
         self.model = model
         self.risk = risk
@@ -158,6 +162,7 @@ class Accumulator:
         self.belief = belief
         self.scale = scale
         self.record = record or Record()
+        self.noise = noise
         self.is_judged = alpha == "cv"
         self.compared: tuple[tuple[Belief, ...], ...] = ()
         self.total = Sums()
@@ -308,6 +313,7 @@ class Accumulator:
             self.belief,
             self.scale,
             self.record,
+            self.noise,
         )
         other.is_judged, other.compared = self.is_judged, self.compared
         return other
@@ -371,7 +377,7 @@ class Accumulator:
         parts = self.total.moments
         if self.risk != "corrected":
             return [part if isinstance(part, Moments) else None for part in parts]
-        correction = Correction.of(add_up(self._folds(None)))
+        correction = Correction.of(add_up(self._folds(None)), self.noise)
         return [
             part.at(correction.variance, correction.scale) if isinstance(part, CorrectedMoments) else None
             for part in parts
@@ -412,7 +418,7 @@ class Accumulator:
     def _solve_corrected(self, folds: list[Any], alpha: float | str) -> Solution:
         """Find the noise of all folds together, and solve what is observed beyond it."""
         total, d = add_up(folds), self.model.n_actions
-        correction = Correction.of(total)
+        correction = Correction.of(total, self.noise)
         observed = correction.observed(total)
         chosen, alphas, risk = alpha, None, None
         if chosen == "cv":
@@ -429,7 +435,7 @@ class Accumulator:
 
     def _observed(self, total: Any) -> Moments:
         """Return what parameters are solved from."""
-        return Correction.of(total).observed(total) if self.risk == "corrected" else total
+        return Correction.of(total, self.noise).observed(total) if self.risk == "corrected" else total
 
     def _solution(
         self,

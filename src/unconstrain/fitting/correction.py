@@ -41,13 +41,16 @@ class Correction:
     looks_free: bool = False
 
     @classmethod
-    def of(cls, total: CorrectedMoments) -> "Correction":
+    def of(cls, total: CorrectedMoments, known: float = 0.0) -> "Correction":
         """Find the noise.
 
         Parameters
         ----------
         total : CorrectedMoments
             Of all samples.
+        known : float
+            The variance of the noise where it is known beforehand, in squared units of the action; 0 where it is not.
+            What more would explain the actions is then misfit.
 
         Returns
         -------
@@ -61,6 +64,7 @@ class Correction:
         """
         check_scale(total.scale, "corrected")
         variance, is_root = Pencil.of(total, total.scale).find_variance()
+        variance = min(variance, known) if known > 0 else variance
         return cls(variance, total.scale, is_root, _looks_free(total, variance))
 
     def observed(self, part: CorrectedMoments) -> Moments:

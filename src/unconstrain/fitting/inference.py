@@ -318,11 +318,8 @@ class Inference:
     @property
     def _floor(self) -> float:
         beside_speed = self.stage == "run" and "speed" in self.runs[-1].kinds
-        return (
-            (LEAST_NOISE_BESIDE_SPEED if beside_speed else LEAST_NOISE) ** 2
-            * self.scale
-            / self.blank.model.n_actions
-        )
+        share = LEAST_NOISE_BESIDE_SPEED if beside_speed else LEAST_NOISE
+        return max(share**2 * self.scale / self.blank.model.n_actions, self.blank.noise)
 
     def _blank(self, risk: str, belief: Belief | None = None) -> Accumulator:
         wanted = self.blank.empty()

@@ -66,6 +66,7 @@ class Policy(RegressorMixin, BaseEstimator):
     alpha: float | str
     space: Space | None
     scale: Any
+    noise: float | None
     model_: Model
     solution_: Solution
     accumulator_: Accumulator
@@ -111,8 +112,8 @@ class Policy(RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X : array_like of shape (N, n), or Demonstrations
-            States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, and the
-            projections they know, unless these are given.
+            States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, the
+            projections they know, and the noise of actions that were differentiated, unless these are given.
         y : array_like of shape (N, d) or (N,)
             Actions.
         groups : array_like of shape (N,), optional
@@ -137,7 +138,8 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         fresh = self._without_stability()
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-        accumulator = fresh.start(samples, X.space if isinstance(X, Demonstrations) else None)
+        given = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
+        accumulator = fresh.start(samples, *given)
         if self.risk == "adaptive":
             accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
         else:
@@ -199,7 +201,7 @@ class Policy(RegressorMixin, BaseEstimator):
             )
         return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
 
-    def start(self, samples: Samples, space: Space | None = None) -> Accumulator:
+    def start(self, samples: Samples, space: Space | None = None, noise: float | None = None) -> Accumulator:
         """Make an accumulator for this policy's options, its model placed by some samples.
 
         Parameters
@@ -208,6 +210,9 @@ class Policy(RegressorMixin, BaseEstimator):
             Checked. Those without motion or a known projection do not count in placing.
         space : Space, optional
             That the samples' states belong to; numbers by default. The policy's own, if it has one, comes first.
+        noise : float, optional
+            Standard deviation of the actions' noise, where it is known of these recordings; the policy's own option
+            takes its place.
 
         Returns
         -------
@@ -234,12 +239,15 @@ class Policy(RegressorMixin, BaseEstimator):
         space = self.space or space or Numbers(X.shape[1])
         _check_in_space(space, X)
         scale = find_scale(self.scale, space, X, U.shape[1])
-        if space.is_flat and scale is None:
-            return Accumulator(self.place(X[counted], U.shape[1], weights[counted]), self.risk, self.alpha)
+        # Of actions in several units the noise in units of the scale is at least that of the largest.
+        sure = noise if noise is None or scale is None else noise / float(scale.max())
+        known = float((sure if self.noise is None else self.noise) or 0.0) ** 2
         base = None if space.is_flat else space.find_base(X[counted])
         Z = X[counted] if space.is_flat else space.embed(X[counted], base)
-        placed = self.place(Z, U.shape[1], weights[counted])
-        return Accumulator(InSpace(placed, space, base, scale), self.risk, self.alpha)
+        model = self.place(Z, U.shape[1], weights[counted])
+        if not (space.is_flat and scale is None):
+            model = InSpace(model, space, base, scale)
+        return Accumulator(model, self.risk, self.alpha, noise=known)
 
     def resume(self) -> Accumulator:
         """Copy the sums that this policy was solved from, to add to them.
@@ -585,6 +593,7 @@ class Policy(RegressorMixin, BaseEstimator):
         DataError
             Nothing moves.
         """
+        check_is_fitted(self)
         U = self.scaled(check_actions(y))
         P = self.scaled(check_actions(self.predict(X), "predictions"))
         if self.solution_.belief is not None:
@@ -747,12 +756,14 @@ class Policy(RegressorMixin, BaseEstimator):
         return U if scale is None else U / scale
 
     def check_options(self) -> None:
-        """Raise `PolicyError` for a risk or a weight decay that is none."""
+        """Raise `PolicyError` for a risk, a weight decay or a noise that is none."""
         check_choice(self.risk, "risk", RISKS)
         if isinstance(self.alpha, str):
             check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
         else:
             check_number(self.alpha, "alpha", positive=False)
+        if self.noise is not None:
+            check_number(self.noise, "noise", positive=False)
 
     @property
     def n_actions_(self) -> int:

@@ -44,6 +44,8 @@ class LocallyLinearPolicy(Policy):
         As for `ParametricPolicy`.
     alpha : "cv" or float
         As for `ParametricPolicy`; one λ for all models.
+    noise : float, optional
+        As for `ParametricPolicy`.
     prior : {"global", "zero"}
         What each model decays to: the policy of the same features fitted to all data together, or zero, as published.
     random_state : int, optional
@@ -82,6 +84,7 @@ class LocallyLinearPolicy(Policy):
         n_centers: int = 30,
         risk: str = "adaptive",
         alpha: float | str = "cv",
+        noise: float | None = None,
         prior: str = "global",
         random_state: int | None = 0,
         space: Space | None = None,
@@ -94,6 +97,7 @@ class LocallyLinearPolicy(Policy):
         self.n_centers = n_centers
         self.risk = risk
         self.alpha = alpha
+        self.noise = noise
         self.prior = prior
         self.random_state = random_state
         self.space = space

@@ -42,6 +42,10 @@ class ParametricPolicy(Policy):
         What a length of one is along each action: lengths, angles and noise are those of `u_i / s_i`. "auto" takes how
         far the states spread along each. By default actions count as they are, but where some are angles, and others
         are not, the spread of all of a unit decides.
+    noise : float, optional
+        Standard deviation of the actions' noise, in their unit, where it is known; by default what `Demonstrations` say
+        of velocities that were differentiated. With "adaptive" the noise that is inferred is not below it, with
+        "corrected" that much is taken away; the other risks do not look at it.
 
     Attributes
     ----------
@@ -88,12 +92,14 @@ class ParametricPolicy(Policy):
         alpha: float | str = "cv",
         space: Space | None = None,
         scale: Any = None,
+        noise: float | None = None,
     ):
         self.features = features
         self.risk = risk
         self.alpha = alpha
         self.space = space
         self.scale = scale
+        self.noise = noise
 
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
         """Fit the features.

@@ -12,11 +12,17 @@ Array = NDArray[np.float64]
 # Actions are what they differ from by less than this share, of the square.
 NEAR = 0.3
 
+# What differs by more than this share, of the square, is no velocity, not even a noisy one.
+UNLIKE = 0.6
+
 # How many samples at most a commanded state is ahead of the state.
 AHEAD = 5
 
 # Fewer samples tell nothing.
 LEAST = 20
+
+# Commands that a controller scales lie within -1 and 1, and reach further than this.
+REACH = 0.3
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,7 @@ class ActionKind:
 
     Parameters
     ----------
-    kind : {"velocity", "target", "increment"}
+    kind : {"velocity", "target", "increment", "scaled"}
     found : bool
         Whether it was found by comparison, rather than given.
     timed : bool
@@ -40,6 +46,12 @@ class ActionKind:
         """Note what was found and what is done about it."""
         if not self.found or self.kind == "velocity":
             return ()
+        if self.kind == "scaled":
+            text = (
+                "the actions lie within -1 and 1 and are no derivative of the states, as commands that a controller "
+                'scales: they are learnt as they are; action="differentiate" learns the velocities of the states'
+            )
+            return (Note("actions", "", text),)
         is_what = "commanded states" if self.kind == "target" else "the steps to the next state"
         if not self.timed:
             done = "they are no velocities; give time= or rate= too to have these"
@@ -69,8 +81,8 @@ def find_kind(X: Array, U: Array, episodes: NDArray[np.int64], time: Array | Non
 
     Returns
     -------
-    {"velocity", "target", "increment"}
-        "velocity" where actions are nothing of the sort.
+    {"velocity", "target", "increment", "scaled"}
+        "velocity" where actions are nothing of the sort, or "scaled" where they are within -1 and 1 then.
     """
     if X.shape != U.shape or len(X) < LEAST:
         return "velocity"
@@ -95,7 +107,11 @@ def _find_kind(X: Array, U: Array, episodes: NDArray[np.int64], time: Array | No
     misses.setdefault("velocity", np.inf)
     # In this order, so that at one sample a second increments count as the velocities that they are.
     best = min(("velocity", "target", "increment"), key=lambda kind: misses.get(kind, np.inf))
-    return best if misses[best] < NEAR else "velocity"
+    if misses[best] < NEAR:
+        return best
+    largest = float(np.max(np.abs(given)))
+    is_scaled = REACH < largest <= 1.0 and UNLIKE < misses["velocity"] < np.inf
+    return "scaled" if is_scaled else "velocity"
 
 
 def _miss_of_target(X: Array, U: Array, episodes: NDArray[np.int64]) -> float:

@@ -57,7 +57,7 @@ def make_recording(
         if not saved:  # its notes are on what it takes for time
             notes = declared.notes if columns.time is None else ()
             declared = replace(declared, notes=tuple(f"{name}: {note}" for note in notes))
-    if columns.state is None and columns != Columns(topic=columns.topic) and not saved:
+    if columns.state is None and columns != Columns(topic=columns.topic, part=columns.part) and not saved:
         raise DataError(f"give state= too: other columns were given for {shown}, but no state columns")
     try:
         roles = assign_roles(filled[0].columns(), own, declared, preparation, shown)

@@ -43,6 +43,7 @@ class Batches:
     whole_episodes_for = None
     row_groups = None
     n_rows = None
+    noise = None
 
     def __init__(self, given: Iterable | Callable[[], Iterable], *, min_speed: float | None = None) -> None:
         self._given, self._min_speed = given, min_speed

@@ -132,6 +132,11 @@ class Source(Protocol):
         ...
 
     @property
+    def noise(self) -> float | None:
+        """Standard deviation of the actions' noise, where it is known."""
+        ...
+
+    @property
     def whole_episodes_for(self) -> str | None:
         """What is done to a sample with its neighbours, so that blocks hold whole episodes."""
         ...

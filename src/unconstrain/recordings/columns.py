@@ -64,6 +64,10 @@ class Columns:
         For ROS bags: the topic whose messages are the samples, and whose fields are the columns. With several, columns
         are called `/topic/field`, and the others are aligned to the stamps of the first. By default the only topic with
         numbers.
+    part : str, optional
+        Which sheet, section or set of a file is read, where it holds several: the name of a sheet, the title of a
+        section, or the path of a group in an HDF5, MATLAB or NPZ file, or its end. By default the largest set of
+        demonstrations.
 
     Raises
     ------
@@ -83,6 +87,7 @@ class Columns:
     angle: Keys | None = None
     rotation: Keys | None = None
     topic: str | Sequence[str] | None = None
+    part: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("state", "action", "force", "projections", "relative_to", "angle", "rotation"):
@@ -105,6 +110,10 @@ class Columns:
         topics = [] if self.topic is None else list(self.topics)
         if self.topic is not None and not (topics and all(isinstance(each, str) and each for each in topics)):
             raise DataError(f"topic takes the name of a topic or a list of them, got {show(self.topic)}")
+        if self.part is not None and not (isinstance(self.part, str) and self.part.strip()):
+            raise DataError(
+                f"part takes the name of a sheet, section or set of a file, got {self.part!r:.60}"
+            )
         if self.projections is not None and not (self.force is self.free is None):
             other = "force" if self.force is not None else "free"
             raise DataError(

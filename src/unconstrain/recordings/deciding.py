@@ -1,9 +1,10 @@
-"""What the states and actions of recordings are is decided once for all of them, by the first."""
+"""What states and actions are, and over how long states are smoothed, is decided once for all, by the first."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.actions import ActionKind, find_kind
@@ -11,7 +12,14 @@ from unconstrain.recordings.blocks import number_values
 from unconstrain.recordings.columns import DIFFERENTIATE
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.pieces import Piece, read_numbers
+from unconstrain.recordings.preparing.filling import fill_columns
+from unconstrain.recordings.preparing.motion import follow_states, resample
+from unconstrain.recordings.preparing.reading import read
+from unconstrain.recordings.preparing.rows import Portion, Rows
+from unconstrain.recordings.preparing.splitting import split_rows
+from unconstrain.recordings.preparing.timing import time_rows
 from unconstrain.recordings.recording import FIRST_ROWS, Recording, distinct
+from unconstrain.recordings.smoothing import find_smoothing
 from unconstrain.recordings.states import FirstRows, arrange_reference, find_frame, find_space, in_frame
 from unconstrain.spaces import Numbers, Space
 from unconstrain.spaces.frames import takes_frame
@@ -50,7 +58,7 @@ def decide_kind(recordings: Sequence[Recording], given: str | None) -> tuple[Rec
         raise DataError(
             f"{first.shown}: action_is={given} needs to know the time of each sample; give time= or rate= too"
         )
-    if kind.kind == "increment" or not kind.timed:
+    if kind.kind in ("increment", "scaled") or not kind.timed:
         return tuple(replace(each, kind=kind) for each in recordings)
     return tuple(replace(_differentiated(each), kind=kind) for each in recordings)
 
@@ -179,3 +187,70 @@ def _read_first(recording: Recording) -> FirstRows:
     n = len(roles.state)
     U = both[n:].T[order] if roles.action else None
     return FirstRows(both[:n].T[order], U, codes[order], seconds)
+
+
+def decide_smoothing(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Find over how long states are smoothed, and their noise: by the first rows, which may be of several recordings.
+
+    They share one window, so that one noise holds for all velocities. By rows of their own, short recordings could
+    hardly tell it.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    tuple of Recording
+        What cannot be read stays as it is: that is for whoever reads all of it to say.
+    """
+    smoothed = [each for each in recordings if each.smooths and each.timed]
+    if not smoothed:
+        return tuple(recordings)
+    parts: list[Rows] = []
+    left = FIRST_ROWS
+    for recording in smoothed:
+        if left <= 0:
+            break
+        try:
+            rows = _prepare_first(recording, left)
+        except DataError:
+            return tuple(recordings)
+        if len(rows):
+            parts.append(rows)
+        left -= len(rows)
+    if not parts:
+        return tuple(recordings)
+    X = np.concatenate([_coordinates(smoothed[0].recorded_space, rows) for rows in parts])
+    time = np.concatenate([rows.time for rows in parts if rows.time is not None])
+    before = np.cumsum([0, *(len(rows.origins) for rows in parts)])
+    codes = np.concatenate([rows.codes + n for rows, n in zip(parts, before, strict=False)])
+    found = find_smoothing(X, time, codes, window=smoothed[0].preparation.window)
+    return tuple(replace(each, smoothing=found) if each.smooths else each for each in recordings)
+
+
+def _coordinates(space: Space, rows: Rows) -> NDArray[np.float64]:
+    """Return what is differentiated, (N, c)."""
+    C = np.empty((len(rows), space.coordinates(space.origin[None]).shape[1]))
+    for own in rows.runs():
+        C[own] = space.coordinates(rows.X[own])
+    return C
+
+
+def _prepare_first(recording: Recording, n_rows: int) -> Rows:
+    """Prepare the first rows until they would be differentiated; episodes that are too short to tell are left out."""
+    how = recording.preparation
+    drop = "short" if how.drop is None else f"{how.drop},short"
+    probe = replace(recording, preparation=replace(how, drop=drop, window=None, min_duration=None))
+    pieces: list[Piece] = []
+    count = 0
+    for piece in probe.read_pieces(probe.keys(everything=False)):
+        pieces.append(piece.slice(0, n_rows - count))
+        count += len(pieces[-1].rows)
+        if count >= n_rows:
+            break
+    portion = Portion(probe, pieces, 0, everything=False)
+    rows, _ = read(portion)
+    for step in (time_rows, fill_columns, follow_states, split_rows, resample):
+        rows, _ = step(portion, rows)
+    return rows

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.errors import DataError
+from unconstrain.recordings.resampling import spread
 from unconstrain.recordings.steps import comes_in_bursts, typical_step
 
 Array = NDArray[np.float64]
@@ -64,16 +65,41 @@ def differentiate(states: ArrayLike, time: ArrayLike, *, window: float = 0.2, po
             f"a window of {window:g} s and a polynomial of degree {polyorder}"
         )
     t = t - t[0]
-    size, length = _grid_size(t), window_samples(_step(t), window, polyorder)
-    grid = np.linspace(0.0, t[-1], size)
-    step = t[-1] / (size - 1)
-    even = size == len(t) and bool(np.all(np.abs(t - grid) <= EVEN * step))
     X = X - X[0]  # so that what rests has a slope of exactly zero
     if comes_in_bursts(np.diff(t)):
         return _slopes_of_bursts(X, t, window, polyorder)
-    on_grid = X if even else CubicSpline(t, X)(grid)
+    on_grid, step = even_grid(X, t)
+    length = window_samples(_step(t), window, polyorder)
     slopes = savgol_filter(on_grid, length, polyorder, deriv=1, delta=step, axis=0, mode="interp")
-    return slopes if even else CubicSpline(grid, slopes)(t)
+    return slopes if on_grid is X else CubicSpline(np.linspace(0.0, t[-1], len(slopes)), slopes)(t)
+
+
+def even_grid(states: Array, time: Array) -> tuple[Array, float]:
+    """Bring the states of one episode to even steps, by cubic splines; stamps in bursts are spread before.
+
+    Parameters
+    ----------
+    states : ndarray of shape (N, n)
+    time : ndarray of shape (N,)
+        Seconds, strictly increasing.
+
+    Returns
+    -------
+    ndarray of shape (M, n)
+        The very states where the steps are even already.
+    float
+        The step (s).
+    """
+    from scipy.interpolate import CubicSpline
+
+    stamps = spread(time)
+    t = stamps - stamps[0]
+    size = _grid_size(t)
+    step = t[-1] / (size - 1)
+    grid = np.linspace(0.0, t[-1], size)
+    if size == len(t) and np.all(np.abs(t - grid) <= EVEN * step):
+        return states, step
+    return CubicSpline(t, states)(grid), step
 
 
 def _slopes_of_bursts(X: Array, t: Array, window: float, polyorder: int) -> Array:
@@ -97,6 +123,11 @@ def window_samples(step: float, window: float, polyorder: int = 2) -> int:
     """Return the odd number of samples that spans `window` seconds best, at least `polyorder` + 1."""
     half = max(round(window / (2 * step)), (polyorder + 1) // 2)
     return 2 * half + 1
+
+
+def longest_window(time: Array) -> float:
+    """Return the longest window (s) of which an episode with these stamps (seconds, increasing) has all samples."""
+    return 2 * ((_grid_size(time) - 1) // 2) * _step(time)
 
 
 def spans_window(time: Array, window: float, polyorder: int = 2) -> bool:

@@ -104,8 +104,8 @@ def _why_empty(recording: Recording, notes: Sequence[Note]) -> str:
     if "pause" in found:
         return "all of it is at rest, and nothing is left without pauses; leave them in"
     return (
-        f"in each of its {found.get('empty', 0)} rows a state, an action or a stamp is missing; fill them in, or "
-        "choose other columns"
+        f"in each of its {found.get('empty', 0)} rows a state, an action or a stamp is missing; fill them in, choose "
+        "other columns, or give resample= where columns are filled at different rates"
     )
 
 

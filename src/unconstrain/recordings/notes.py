@@ -1,13 +1,17 @@
 """What a reader found in a recording, or did to it, that its user should know."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 KINDS = (
-    "saved", "guess", "time", "burst", "rotation", "turn", "frame", "actions", "empty", "repeated", "angle", "gap",
-    "speed", "short", "jump", "pause", "missing", "slow", "relative", "order", "read",
+    "saved", "guess", "time", "burst", "rotation", "turn", "frame", "actions", "smoothing", "empty", "repeated",
+    "angle", "gap", "speed", "short", "jump", "pause", "missing", "slow", "relative", "order", "read",
 )  # fmt: skip
 """In the order in which notes on one file are given; a new finding adds a line of its own here."""
+
+MOST_ALIKE = 3
+"""Files in which the same was found, and which are named one by one."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,41 @@ def combine(notes: Iterable[Note]) -> tuple[Note, ...]:
         found.values(), key=lambda note: (not note.file, files[note.file], KINDS.index(note.kind))
     )
     return tuple(ordered)
+
+
+def gather(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """Say once what was found alike in many files.
+
+    Parameters
+    ----------
+    notes : iterable of Note
+
+    Returns
+    -------
+    tuple of Note
+        Of those that differ by nothing but the file and numbers, where there are more than `MOST_ALIKE`, the first,
+        with all their counts, that says how many they are.
+    """
+    every = tuple(notes)
+    alike: dict[tuple[str, str], list[Note]] = {}
+    for note in every:
+        if note.file:
+            alike.setdefault(_kind_of(note), []).append(note)
+    said: list[Note] = []
+    for note in every:
+        several = alike.get(_kind_of(note), []) if note.file else []
+        if len(several) <= MOST_ALIKE:
+            said.append(note)
+        elif note is several[0]:
+            sums = tuple(map(sum, zip(*(each.counts for each in several), strict=True)))
+            more = "and" if sums else "and, with other numbers perhaps,"
+            file = f"{note.file} {more} {len(several) - 1} more files"
+            said.append(replace(note, file=file, counts=sums))
+    return tuple(said)
+
+
+def _kind_of(note: Note) -> tuple[str, str]:
+    return note.kind, re.sub(r"\d+", "#", note.text)
 
 
 def add_up(notes: Iterable[Note]) -> tuple[Note, ...]:

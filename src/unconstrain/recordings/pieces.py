@@ -81,7 +81,7 @@ class Piece(NamedTuple):
             return pc.equal(pc.fill_null(pc.utf8_trim_whitespace(values), ""), "").to_numpy(
                 zero_copy_only=False
             )
-        return ~np.isfinite(cells.numbers_or_nan())
+        return ~np.isfinite(cells.numbers_or_nan(beside_text=True))
 
     def _missing_component(self, values: Any, width: int, component: int) -> NDArray[np.bool_]:
         lengths = pc.fill_null(pc.list_value_length(values), 0).to_numpy(zero_copy_only=False)

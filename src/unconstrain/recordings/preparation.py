@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from numbers import Real
 
 from unconstrain.errors import DataError, show
-from unconstrain.spaces.rotation import FRAMES
+from unconstrain.spaces.words import FRAMES
 
 TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Ticks a second."""
@@ -22,6 +22,9 @@ TIME_AXES = ("first", "last")
 ANGLE_UNITS = ("rad", "deg")
 
 ORDERS = (1, 2)
+
+# Of smaller numbers the inverse, such as the step of a rate, is infinite.
+SMALLEST = 1e-300
 
 CHOICES = {
     "time_unit": tuple(TIME_UNITS),
@@ -52,9 +55,11 @@ class Preparation:
         duplicates (rows with the stamp of the row before), short (episodes too short to be used), pauses (stretches at
         rest).
     resample : float, optional
-        Samples a second to which episodes are brought by linear interpolation, never across gaps.
-    window : float
-        Seconds over which states are smoothed when they are differentiated.
+        Samples a second to which episodes are brought by linear interpolation, never across gaps. Columns that are
+        filled at different rates are interpolated each between its own stamps.
+    window : float, optional
+        Seconds over which states are smoothed when they are differentiated. By default it is found from their noise
+        (`recordings.smoothing`), and noted.
     gap : float, optional
         A step longer than this (s) splits an episode. By default, where states are differentiated, five times the
         episode's median step does.
@@ -94,7 +99,7 @@ class Preparation:
     action_is: str | None = None
     drop: str | Sequence[str] | None = None
     resample: float | None = None
-    window: float = 0.2
+    window: float | None = None
     gap: float | None = None
     max_speed: float | None = None
     min_speed: float | None = None
@@ -127,7 +132,7 @@ class Preparation:
                 number = float(value)
             except (TypeError, ValueError, OverflowError):
                 number = math.nan
-            if isinstance(value, bool) or not isinstance(value, Real) or not 0 < number < math.inf:
+            if isinstance(value, bool) or not isinstance(value, Real) or not SMALLEST < number < math.inf:
                 raise DataError(f"{field.name} must be a positive number, got {show(value)}")
 
     def drops(self, what: str) -> bool:

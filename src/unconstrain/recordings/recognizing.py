@@ -1,18 +1,24 @@
 """Which recordings there are in a source, and of what formats their files are."""
 
 import os
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
+
+import pyarrow.fs
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File, Folder, locate
-from unconstrain.recordings.formats import lerobot, recognize, rosbag_reading
-from unconstrain.recordings.formats.base import Format, narrow
+from unconstrain.recordings.formats import FORMATS, lerobot, recognize, rosbag_reading
+from unconstrain.recordings.formats.base import Format, narrow, narrow_to_part
 from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.nested import Nested
 from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
 from unconstrain.recordings.formats.parquet import Parquet
+
+ZARR = (".zgroup", ".zarray", "zarr.json")
+"""Files by which a folder is a Zarr store."""
 
 
 class Found(NamedTuple):
@@ -70,7 +76,11 @@ def open_formats(
     with ThreadPoolExecutor(16) as pool:  # footers are small and far apart
         opened = iter(list(pool.map(_open_file, every)))
     return [
-        Found(shown, _joined(shown, [narrow(next(opened), columns.topics) for _ in files], time_axis), robot)
+        Found(
+            shown,
+            _joined(shown, [narrow(next(opened), columns.topics) for _ in files], time_axis, columns.part),
+            robot,
+        )
         for shown, files, robot in located
     ]
 
@@ -80,6 +90,7 @@ def _recordings_of(place: File | Folder, columns: Columns) -> list[_Located]:
         return [_Located(place.shown, [place])]
     if rosbag_reading.is_bag(place):
         return [_Located(place.shown, [rosbag_reading.as_file(place)])]
+    place = lerobot.find_snapshot(place)
     robot = lerobot.recognize(place)
     files = list(robot.files if robot else place.parquet_files())
     arrays = [] if files or robot else list(place.files(Npy.suffixes))
@@ -88,13 +99,30 @@ def _recordings_of(place: File | Folder, columns: Columns) -> list[_Located]:
     if arrays:
         return [_Located(place.shown, arrays)]
     if not files:
-        where = os.path.join(place.shown, "*.csv")
-        raise DataError(
-            f"{place.shown} is a folder without Parquet files: give its files, or a pattern such as {where}"
-        )
+        return [_Located(file.shown, [file]) for file in _files_of_one_kind(place)]
     if robot is None and columns.state is None and Parquet(files[0]).declared() is not None:
         return [_Located(file.shown, [file]) for file in files]  # each counts its episodes by itself
     return [_Located(place.shown, files, robot)]
+
+
+def _files_of_one_kind(folder: Folder) -> list[File]:
+    """Return the files of a folder, which are a recording each, as a pattern for them would."""
+    if any(folder.file(name).info.type == pyarrow.fs.FileType.File for name in ZARR):
+        raise DataError(
+            f"{folder.shown} is a Zarr store, which is not read: save its arrays with numpy.savez or as HDF5, by the "
+            "same names"
+        )
+    suffixes = tuple(suffix for kind in FORMATS for suffix in kind.suffixes)
+    kinds = Counter(file.suffix for file in folder.files(suffixes))
+    pattern = os.path.join(folder.shown, f"*{next(iter(kinds), '.csv')}")
+    if len(kinds) == 1:
+        return list(folder.files(next(iter(kinds))))
+    holds = (
+        f" ({', '.join(f'{number} {suffix}' for suffix, number in kinds.items())} are there)" if kinds else ""
+    )
+    raise DataError(
+        f"{folder.shown} is a folder without Parquet files: give its files, or a pattern such as {pattern}{holds}"
+    )
 
 
 def _open_file(about: tuple[File, bool]) -> Format:
@@ -107,12 +135,15 @@ def _open_file(about: tuple[File, bool]) -> Format:
     return opened
 
 
-def _joined(shown: str, formats: list[Format], time_axis: str | None) -> list[Format]:
-    """Make one format of the arrays of a folder, and say which axis is time; other files are read in turn."""
+def _joined(shown: str, formats: list[Format], time_axis: str | None, part: str | None) -> list[Format]:
+    """Make one format of the arrays of a folder, and say what is read of it; other files are read in turn."""
     arrays = [each for each in formats if isinstance(each, Npy)]
     joined: list[Format] = [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
+    joined = [narrow_to_part(each, part) for each in joined]
     if time_axis is None:
         return joined
     if not all(isinstance(each, Nested) for each in joined):
-        raise DataError(f"{shown}: time_axis= is for arrays in MATLAB, HDF5 and .npy files; leave it out")
+        raise DataError(
+            f"{shown}: time_axis= is for arrays in MATLAB, HDF5, .npz and .npy files; leave it out"
+        )
     return [each.with_time_axis(time_axis) for each in joined if isinstance(each, Nested)]

@@ -12,11 +12,13 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.actions import VELOCITY, ActionKind
 from unconstrain.recordings.blocks import number_values
 from unconstrain.recordings.columns import NO_ANGLE, Columns
+from unconstrain.recordings.derivative import longest_window
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.formats.base import ColumnKey, Declared, Format
 from unconstrain.recordings.pieces import Piece, read_labels, read_numbers
-from unconstrain.recordings.preparation import Preparation
+from unconstrain.recordings.preparation import TIME_UNITS, Preparation
 from unconstrain.recordings.roles import Roles
+from unconstrain.recordings.smoothing import Smoothing
 from unconstrain.recordings.steps import runs
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.time import Clock
@@ -28,7 +30,7 @@ BLOCKS = 5
 """Into how many contiguous blocks a single file without episodes is cut, which streams take for episodes."""
 
 FIRST_ROWS = 10_000
-"""Rows, at most, by which it is decided how stamps are read, and what actions are."""
+"""Rows, at most, by which it is decided how stamps are read, what actions are, and how long states are smoothed."""
 
 
 class Episodes(NamedTuple):
@@ -44,6 +46,10 @@ class Episodes(NamedTuple):
 
     values: list[Any]
     labels: list[str]
+
+
+NEEDED = ("state", "relative_to", "action", "time")
+"""What a row must hold to be used."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,8 @@ class Recording:
         The recording whose unit of time is taken where it has to be guessed.
     place : Space, optional
         What the states in the files are; by default numbers.
+    smoothing : Smoothing, optional
+        Where something is differentiated, what was found of the states' noise.
     """
 
     shown: str
@@ -93,6 +101,7 @@ class Recording:
     kind: ActionKind = VELOCITY
     leader: "Recording | None" = None
     place: Space | None = None
+    smoothing: Smoothing | None = None
 
     @property
     def recorded_space(self) -> Space:
@@ -143,6 +152,27 @@ class Recording:
         return self.differentiates or bool(self.roles.reference) or self.preparation.order == 2
 
     @property
+    def window(self) -> float:
+        """Over how long (s) states are smoothed when they are differentiated."""
+        if self.preparation.window is not None:
+            return self.preparation.window
+        # Where nothing could be found, the fewest samples that have a slope.
+        return 2 * self.step if self.smoothing is None else self.smoothing.window
+
+    def fit_window(self, stamps: NDArray[np.float64]) -> float:
+        """Return over how long (s) an episode with these stamps (N,) is smoothed: what was found may be too long."""
+        return min(self.window, longest_window(stamps)) if self.preparation.window is None else self.window
+
+    @property
+    def noise(self) -> float | None:
+        """Standard deviation of the noise of actions that were differentiated, where it is known."""
+        if self.preparation.order == 2 or self.roles.rotations:
+            return None  # that of accelerations and of turning is not known
+        if self.differentiates:
+            return None if self.smoothing is None else self.smoothing.velocity_noise
+        return self.declared.noise if self.saves and self.declared is not None else None
+
+    @property
     def splits(self) -> bool:
         """Whether samples are prepared by their time: split, resampled, differentiated, or left out by it."""
         if not self.timed:
@@ -151,6 +181,11 @@ class Recording:
         asked = not (how.gap is how.max_speed is how.resample is None)
         by_time = any(how.drops(what) for what in ("duplicates", "short", "pauses"))
         return self.smooths or asked or by_time or self.kind.kind == "increment"
+
+    @property
+    def fills(self) -> bool:
+        """Whether columns that are filled at different rates are interpolated, each between its own stamps."""
+        return self.timed and self.preparation.resample is not None and not self.saves
 
     @property
     def timed(self) -> bool:
@@ -289,13 +324,18 @@ class Recording:
     def clock(self) -> Clock:
         """How stamps are read, decided by the first rows."""
         assert self.roles.time is not None
-        keys = distinct((self.roles.time,), () if self.roles.episode is None else (self.roles.episode,))
+        episode = () if self.roles.episode is None else (self.roles.episode,)
+        states = self.roles.state if self.preparation.drops("missing") else ()
+        keys = distinct((self.roles.time,), episode, states)
         piece = next(piece for piece in self.read_pieces(keys) if len(piece.rows))
         piece = piece.slice(0, FIRST_ROWS) if not piece.format.at_once else piece
-        if self.preparation.drops("missing"):
-            piece = piece.without(piece.missing(self.roles.time, "time"))
+        timed = self.complete([piece], ("time",))[0]
+        piece = self.complete([piece])[0]
+        piece = piece if len(piece.rows) else timed
         codes, _ = number_values(self.labels([piece]))
         unit = "s" if self.saves else self.preparation.time_unit
+        if unit is None and self.preparation.rate is None and self.roles.time.unit in TIME_UNITS:
+            unit = self.roles.time.unit
         cells = piece.cells(self.roles.time, "time")
         own = Clock.decide(cells, codes, unit, self.preparation.rate)
         if unit is not None or self.leader is None or own.of_type:
@@ -315,7 +355,7 @@ class Recording:
     @property
     def shortest(self) -> float:
         """How long (s) a fragment of a split episode has to last."""
-        window = self.preparation.window if self.smooths else 0.0
+        window = self.window if self.smooths else 0.0
         return max(window, self.preparation.min_duration or 0.0)
 
     def keys(self, everything: bool) -> list[ColumnKey]:
@@ -337,9 +377,20 @@ class Recording:
             dict.fromkeys([*distinct(fields), *columns, *distinct(roles.policy if everything else (), last)])
         )
 
-    def complete(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
-        """Leave out the rows without a state, what it is relative to, an action or a stamp, where that is asked for."""
-        if not self.preparation.drops("missing"):
+    def complete(self, pieces: Sequence[Piece], needed: Sequence[str] = NEEDED) -> Sequence[Piece]:
+        """Leave out the rows without a state, what it is relative to, an action or a stamp, where that is asked for.
+
+        Parameters
+        ----------
+        pieces : sequence of Piece
+        needed : sequence of str
+            What must be there.
+
+        Returns
+        -------
+        sequence of Piece
+        """
+        if not (self.preparation.drops("missing") or self.fills):
             return pieces
         roles = self.roles
         several = (
@@ -348,7 +399,7 @@ class Recording:
             ("action", roles.action),
             ("time", () if roles.time is None else (roles.time,)),
         )
-        wanted = [(role, field) for role, fields in several for field in fields]
+        wanted = [(role, field) for role, fields in several if role in needed for field in fields]
         complete = []
         for piece in pieces:
             missing = np.zeros(len(piece.rows), dtype=bool)

@@ -283,6 +283,7 @@ class Recordings:
             action_names=names[1],
             episode_labels=[labels.of[key] for key in numbers],
             notes=[str(note) for note in notes],
+            noise=self.source.noise,
         )
 
 
@@ -304,6 +305,7 @@ def open(
     angle: Keys | None = None,
     rotation: Keys | None = None,
     topic: str | Sequence[str] | None = None,
+    part: str | None = None,
     time_unit: str | None = None,
     rate: float | None = None,
     action_is: str | None = None,
@@ -328,19 +330,21 @@ def open(
     Parameters
     ----------
     source : path, pattern, URI, several of them, Demonstrations, data frames, or batches of arrays
-        A file of text (CSV and the like under any suffix, also compressed; exports of Vicon, Motive and OpenSim), JSON
-        Lines, XLSX, C3D, MATLAB, HDF5, NPZ, NPY or Parquet, or a ROS bag; on disk, or at a URI such as
-        ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of Parquet files that are
-        parts of one recording, one of .npy arrays, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1, 3.0), whose columns
-        have known names. A data frame of pandas or Polars, or an Arrow table, is a recording, and so is each of
-        several. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups, projections)``: states
-        (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where a constraint is not
-        known; or a function that returns such an iterable, which can then be read more than once.
+        A file of text (CSV and the like under any suffix, also compressed; exports of Vicon, Motive, Qualisys, OpenSim
+        and LabVIEW), JSON, JSON Lines, XLSX, C3D, Feather, MATLAB, HDF5, NPZ, NPY or Parquet, or a ROS bag; on disk,
+        or at a URI such as ``s3://bucket/file`` that `pyarrow.fs.FileSystem.from_uri` opens. A folder is one of
+        Parquet files that are parts of one recording, one of .npy arrays, a ROS 2 bag, or a LeRobot dataset (2.0, 2.1,
+        3.0), whose columns have known names. A data frame of pandas or Polars, or an Arrow table, is a recording, and
+        so is each of several. Batches are any iterable of ``(X, U)``, ``(X, U, groups)`` or ``(X, U, groups,
+        projections)``: states (N, n), actions (N, d), episode labels (N,) or None, and projections (N, d, d), NaN where
+        a constraint is not known; or a function that returns such an iterable, which can then be read more than once.
     state, action, time, episode, force, free, projections, relative_to, angle, rotation : column, or list of columns
         Which column is what, by name or by position from 0; see `Columns`. A file that `Demonstrations.save` wrote
         needs none of them.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
+    part : str, optional
+        Which sheet, section or set of a file is read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
@@ -383,7 +387,7 @@ def open(
         {
             "state": state, "action": action, "time": time, "episode": episode, "force": force, "free": free,
             "projections": projections, "relative_to": relative_to, "angle": angle,
-            "rotation": rotation, "topic": topic,
+            "rotation": rotation, "topic": topic, "part": part,
         },
     )  # fmt: skip
     preparation = _one_carrier(
@@ -417,7 +421,7 @@ def open(
 def _of_tables(tables: Tables, columns: Columns, preparation: Preparation) -> Recordings:
     found = tables.recordings[0].kind
     if found.found:  # so that other recordings are read alike
-        preparation = replace(preparation, action_is=found.kind)
+        preparation = replace(preparation, action_is="velocity" if found.kind == "scaled" else found.kind)
     return Recordings(tables, columns, preparation)
 
 
@@ -453,6 +457,8 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         Which column is what; see `Columns`.
     topic : str, or list of str, optional
         Which topics of a ROS bag are read; see `Columns`.
+    part : str, optional
+        Which sheet, section or set of a file is read; see `Columns`.
     time_unit, rate, action_is, drop, resample : optional
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional

@@ -12,10 +12,16 @@ from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Key, Keys
+from unconstrain.recordings.units import unit_in
 
 Array = NDArray[np.float64]
 
 MOST_LISTED = 20
+
+NUMBER = r"^[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[nN][aA][nN]|[iI][nN][fF](?:inity)?)$"
+
+STRAY = 0.1
+"""The largest share of text in a column of numbers."""
 
 # Squares of larger numbers overflow; no recording holds them but by mistake.
 LARGEST = 1e150
@@ -38,6 +44,8 @@ class Field(NamedTuple):
         How a sentence speaks of it: by its name where that is enough.
     kind : str
         "number", "text" or the Arrow type, by the file that was looked at first.
+    unit : str
+        What the file says its unit is; "" where it says nothing.
     """
 
     column: str
@@ -46,6 +54,7 @@ class Field(NamedTuple):
     width: int
     called: str
     kind: str
+    unit: str = ""
 
     @property
     def key(self) -> tuple[str, int]:
@@ -69,6 +78,8 @@ class Column:
     part_of: str = ""
     component: int | None = None
     width: int = 0
+    unit: str = ""
+    """What the file says its unit is, as `plain_unit` writes it; "" where it says nothing."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +197,7 @@ class Header:
             column.width,
             called,
             describe_kind(column.kind),
+            column.unit or unit_in(column.name),
         )
 
 
@@ -235,8 +247,17 @@ class Cells:
             )
         return array
 
-    def numbers_or_nan(self) -> Array:
+    def numbers_or_nan(self, *, beside_text: bool = False) -> Array:
         """Return the values as numbers (N,), NaN where they are missing.
+
+        Parameters
+        ----------
+        beside_text : bool
+            Whether text is missing too, in a column of which nine in ten values are numbers.
+
+        Returns
+        -------
+        ndarray of shape (N,)
 
         Raises
         ------
@@ -247,6 +268,8 @@ class Cells:
         if is_text(kind):
             values = pc.utf8_trim_whitespace(values)
             values = pc.if_else(pc.equal(values, ""), pa.scalar(None, kind), values)
+            if beside_text:
+                values = pc.if_else(self.stray_text(), pa.scalar(None, kind), values)
             try:
                 values = values.cast(pa.float64())
             except pa.ArrowInvalid as error:
@@ -256,6 +279,14 @@ class Cells:
                 f"{self.path}: {self.called} holds {kind} values where numbers are needed; choose other columns"
             )
         return values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+
+    def stray_text(self) -> Any:
+        """Tell which values are text in a column of which nine in ten are numbers; none in another one."""
+        values = pc.utf8_trim_whitespace(self.values)
+        stray = pc.invert(pc.match_substring_regex(values, NUMBER))
+        stray = pc.and_(pc.fill_null(stray, False), pc.fill_null(pc.not_equal(values, ""), False))
+        count, there = pc.sum(stray).as_py() or 0, len(values) - values.null_count
+        return stray if count <= STRAY * there else pa.array([False] * len(values))
 
     def flags(self) -> Array:
         """Return flags (N,), 1 or 0; true and false count as these, in letters too.

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.recordings.blocks import Array, Block, Loaded, Motion
 from unconstrain.recordings.loading import check_read, read_blocks
-from unconstrain.recordings.notes import Note, combine
+from unconstrain.recordings.notes import Note, combine, gather
 from unconstrain.recordings.pieces import Piece
 from unconstrain.recordings.reading import BEGINS, KIND, summarize, without_tallies
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.roles import is_named
+from unconstrain.recordings.smoothing import describe_smoothing
 from unconstrain.spaces import Space
 
 HEAD_ROWS = 2
@@ -74,6 +75,16 @@ class Tables:
     def knows_projections(self) -> bool:
         """Whether samples come with projections."""
         return any([recording.knows_projections for recording in self.recordings])  # noqa: C419 - each may raise
+
+    @property
+    def noise(self) -> float | None:
+        """Standard deviation of the actions' noise, where it is known of all recordings; root mean square."""
+        known = [each.noise for each in self.recordings if each.noise is not None]
+        return (
+            math.sqrt(sum(noise**2 for noise in known) / len(known))
+            if len(known) == len(self.recordings)
+            else None
+        )
 
     @property
     def whole_episodes_for(self) -> str | None:
@@ -254,7 +265,7 @@ class Tables:
         if timed and timed[0].saves:
             units = ["in s"]
         files = sum(file.file.filesystem is not None for each in self.recordings for file in each.files)
-        return summarize(notes, files, rates, units)
+        return summarize(gather(notes), files, rates, units)
 
     def notes(self) -> tuple[Note, ...]:
         """Return the notes that need no sample to be read: what files said, and what some of them do not have."""
@@ -262,12 +273,21 @@ class Tables:
         said = dict.fromkeys(note for each in declared for note in each.notes)
         notes = [Note("saved", "", note) for note in said if self.as_saved or not note.startswith(BEGINS)]
         notes += [*self.guesses, *self.recordings[0].kind.note()]
+        notes += self._smoothing()
         for what in OPTIONAL:
             missing = sum(what not in _present(each) for each in self.recordings)
             if 0 < missing < len(self.recordings):
                 text = f"left out {what}, which {missing} of {len(self.recordings)} recordings do not have"
                 notes.append(Note("missing", "", text))
         return tuple(notes)
+
+    def _smoothing(self) -> tuple[Note, ...]:
+        """Note over how long states are smoothed, and how sure velocities are then."""
+        smoothing = [each for each in self.recordings if each.smooths]
+        if not smoothing:
+            return ()
+        given = smoothing[0].preparation.window
+        return describe_smoothing(smoothing[0].smoothing, given)
 
     def without_projections(self) -> "Tables":
         """Return the same source, without the projections that files hold."""

@@ -223,7 +223,7 @@ def begin(
         longest = max(longest, accumulator.total.longest)
     else:
         # Where a sample does not move at all, places are needed all the same.
-        accumulator = policy.start(Samples(X, U if U.any() else np.ones_like(U)), space)
+        accumulator = policy.start(Samples(X, U if U.any() else np.ones_like(U)), space, source.noise)
     accumulator.longest = max(accumulator.longest, longest)
     return accumulator
 

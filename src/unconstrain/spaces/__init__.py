@@ -5,50 +5,30 @@ leads, how states are expressed in the frame of others, and how they are laid ou
 and rollouts need not know what a quaternion is.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from unconstrain import lazy
 
-from unconstrain.errors import UnconstrainError
-from unconstrain.spaces.angle import Angle
-from unconstrain.spaces.base import Space
-from unconstrain.spaces.numbers import Numbers
-from unconstrain.spaces.product import Pose, Product
-from unconstrain.spaces.rotation import Rotation
-from unconstrain.spaces.second_order import SecondOrder
+TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
+
+if TYPE_CHECKING:
+    from unconstrain.spaces.angle import Angle
+    from unconstrain.spaces.base import Space
+    from unconstrain.spaces.description import from_description
+    from unconstrain.spaces.numbers import Numbers
+    from unconstrain.spaces.product import Pose, Product
+    from unconstrain.spaces.rotation import Rotation
+    from unconstrain.spaces.second_order import SecondOrder
 
 __all__ = ["Angle", "Numbers", "Pose", "Product", "Rotation", "SecondOrder", "Space", "from_description"]
 
+_HOMES = {
+    "unconstrain.spaces.angle": ("Angle",),
+    "unconstrain.spaces.base": ("Space",),
+    "unconstrain.spaces.description": ("from_description",),
+    "unconstrain.spaces.numbers": ("Numbers",),
+    "unconstrain.spaces.product": ("Pose", "Product"),
+    "unconstrain.spaces.rotation": ("Rotation",),
+    "unconstrain.spaces.second_order": ("SecondOrder",),
+}
 
-def from_description(about: Mapping[str, Any]) -> Space:
-    """Make a space again of what `Space.describe` says.
-
-    Parameters
-    ----------
-    about : mapping
-        From `describe`.
-
-    Returns
-    -------
-    Space
-        The same.
-
-    Raises
-    ------
-    UnconstrainError
-        It describes none.
-    """
-    try:
-        if "numbers" in about:
-            return Numbers(int(about["numbers"]))
-        if "angle" in about:
-            return Angle(float(about["angle"]))
-        if "rotation" in about:
-            return Rotation(about["rotation"], about["frame"], bool(about["degrees"]))
-        if "second_order" in about:
-            return SecondOrder(from_description(about["second_order"]))
-        columns = tuple(tuple(int(i) for i in own) for own in about["columns"])
-        if "pose" in about:
-            return Pose((Numbers(3), from_description(about["pose"])), columns)
-        return Product(tuple(from_description(part) for part in about["parts"]), columns)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise UnconstrainError(f"this describes no kind of state: {about!r:.80}") from error
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = lazy.attach(__name__, _HOMES)

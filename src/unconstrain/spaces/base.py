@@ -222,10 +222,14 @@ class Space(ABC):
 
         Parameters
         ----------
-        X, to : ndarray of shape (N, n)
+        X : ndarray of shape (N, n)
             States.
-        U, moves : ndarray of shape (N, d)
+        U : ndarray of shape (N, d)
             Their velocities.
+        to : ndarray of shape (N, n)
+            The other states.
+        moves : ndarray of shape (N, d)
+            The velocities of these.
 
         Returns
         -------

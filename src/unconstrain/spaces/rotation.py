@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from unconstrain.arrays import check_choice
 from unconstrain.spaces.base import Array, Space
+from unconstrain.spaces.words import FRAMES
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation as Rotations
 
 WRITTEN = {"xyzw": 4, "wxyz": 4, "rotvec": 3, "euler": 3, "matrix": 9}
 """How rotations may be written, and in how many numbers."""
-
-FRAMES = ("world", "body")
-"""In which frame angular velocities are."""
 
 NEAR = np.radians(150)
 """Rotations that lie within this angle of their mean are laid out as rotation vectors; others as matrices."""
@@ -223,11 +221,9 @@ class Rotation(Space):
         return self.write(mean)[0] if self.written == "matrix" else np.ravel(self.write(mean))
 
     def embed(self, X: Array, base: Array | None) -> Array:
-        """Lay rotations out as rotation vectors from the base, or as matrices; see `Space.embed`.
-
-        Vectors are in the frame of the velocities, so that the velocity of a vector near zero is ω. Matrices are scaled
-        so that what is near lies as far apart as the angle is.
-        """
+        """Lay rotations out as rotation vectors from the base, or as matrices; see `Space.embed`."""
+        # Vectors are in the frame of the velocities: that of one near zero is ω. Matrices are scaled, so that what is
+        # near lies as far apart as the angle is.
         if base is not None:
             return self.difference(np.tile(base, (len(X), 1)), X)
         return self.rotations(X).as_matrix().reshape(-1, 9) / np.sqrt(2.0)

@@ -60,7 +60,7 @@ def test_the_control_frequency_gives_the_time(robomimic):
 
 
 def test_images_are_refused_with_a_reason(robomimic):
-    with pytest.raises(DataError, match="1728 numbers a sample, as images do"):
+    with pytest.raises(DataError, match="bytes along several axes, as images do"):
         uc.load(robomimic[0], state="obs/agentview_image", action="actions")
 
 
@@ -202,3 +202,130 @@ def test_the_missing_extra_is_named(robomimic, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(DataError, match=r"pip install 'unconstrain\[hdf5\]'"):
         uc.load(robomimic[0], state="obs/robot0_eef_pos", action="actions")
+
+
+def write_groups(path, **groups):
+    with h5py.File(path, "w") as file:
+        for name, values in groups.items():
+            file[name.replace("__", "/")] = values
+    return path
+
+
+def test_one_of_several_sets_is_chosen_by_part(tmp_path):
+    rng = np.random.default_rng(0)
+    sets = {"train": 3, "test": 2}
+    arrays = {
+        f"{name}__demo_{i}__{what}": rng.normal(size=(50 + i, 2))
+        for name, number in sets.items()
+        for i in range(number)
+        for what in ("x", "u")
+    }
+    path = write_groups(tmp_path / "a.h5", **arrays, fps=20.0)
+    largest = uc.load(path, state="x", action="u")
+    assert largest.n_episodes == 3
+    assert any("part= reads another set: test" in note for note in largest.notes)
+    chosen = uc.load(path, state="x", action="u", part="test")
+    np.testing.assert_array_equal(chosen.states[:50], arrays["test__demo_0__x"])
+    assert chosen.n_episodes == 2
+    np.testing.assert_allclose(np.diff(chosen.episode(0).time), 0.05)
+    with pytest.raises(DataError, match=r"no part that 'valid' alone stands for; there are test, .*train"):
+        uc.load(path, state="x", action="u", part="valid")
+    with pytest.raises(
+        DataError, match="no part that 'demo_0' alone stands for; there are test/demo_0, train/demo_0"
+    ):
+        uc.load(path, state="x", action="u", part="demo_0")
+    (tmp_path / "a.csv").write_text("x,u\n1,2\n3,4\n")
+    with pytest.raises(DataError, match="part="):
+        uc.load(tmp_path / "a.csv", state="x", action="u", part="test")
+
+
+def test_a_mask_of_robomimic_is_a_part(robomimic):
+    demos = uc.load(robomimic[0], state="obs/robot0_eef_pos", action="actions", part="train")
+    assert demos.episode_labels == ("demo_0", "demo_1")
+
+
+def test_a_network_beside_observations_is_no_demonstration(tmp_path):
+    x = np.random.default_rng(0).normal(size=(600, 4))
+    path = write_groups(
+        tmp_path / "a.h5",
+        observations=x,
+        timeouts=np.arange(600) % 200 == 199,
+        metadata__policy__fc0__weight=np.zeros((64, 4)),
+        metadata__policy__fc0__bias=np.zeros(64),
+    )
+    demos = uc.load(path, state="observations", rate=20)
+    assert demos.n_episodes == 3
+
+
+def test_streams_at_another_rate_are_brought_to_the_stamps(tmp_path):
+    t, slow = np.arange(0, 4, 0.01), np.arange(0.02, 4, 0.1)
+    path = write_groups(
+        tmp_path / "a.h5",
+        joints__q=np.stack([np.sin(t), np.cos(t)], 1),
+        joints__time=t,
+        camera__position=np.stack([2 * slow, -slow], 1),
+        camera__grip=(slow > 2).astype(int),
+        camera__time=slow,
+    )
+    demos = uc.load(
+        path, state=["joints/q", "camera/position", "camera/grip"], drop="missing", action="differentiate"
+    )
+    inside = (t >= slow[0]) & (t <= slow[-1])
+    assert len(demos) == inside.sum()
+    np.testing.assert_allclose(demos.states[:, 2:4], np.stack([2 * t, -t], 1)[inside], atol=1e-12)
+    assert set(demos.states[:, 4]) == {0.0, 1.0}
+    assert any("camera/position, camera/grip: brought from stamps of its own" in note for note in demos.notes)
+    alone = uc.load(path, state="position", part="camera")
+    np.testing.assert_array_equal(alone.states[:, 0], 2 * slow)
+
+
+def test_robosuite_says_the_rate_in_another_attribute(tmp_path):
+    path = tmp_path / "demo.hdf5"
+    rng = np.random.default_rng(0)
+    with h5py.File(path, "w") as file:
+        data = file.create_group("data")
+        data.attrs["env_info"] = json.dumps({"control_freq": 20})
+        for i in (1, 2):
+            clock = np.arange(50 + i) * 0.05
+            data[f"demo_{i}/states"] = np.column_stack([clock, np.cumsum(rng.normal(size=(50 + i, 3)), 0)])
+            data[f"demo_{i}/actions"] = rng.uniform(-1, 1, size=(50 + i, 4))
+    found = uc.inspect(path)
+    assert found.rate_hz == 20
+    assert "--state 'states[1],states[2],states[3]'" in found.next
+    assert any("states[0]: rises evenly, as a clock does" in note for note in found.notes)
+
+
+def test_scaled_commands_are_said_to_be_no_velocities(tmp_path):
+    rng = np.random.default_rng(0)
+    arrays = {}
+    for i in range(3):
+        arrays[f"demo_{i}__pos"] = np.cumsum(rng.normal(size=(80, 3)), 0) * 0.01
+        arrays[f"demo_{i}__actions"] = rng.uniform(-1, 1, size=(80, 3))
+    path = write_groups(tmp_path / "a.h5", **arrays, fps=20.0)
+    demos = uc.load(path, state="pos", action="actions")
+    assert any("within -1 and 1 and are no derivative of the states" in note for note in demos.notes)
+    assert not any("within -1 and 1" in note for note in uc.load(path, state="pos").notes)
+    found = uc.inspect(path)
+    assert "--action" not in found.next
+    assert any("commands within -1 and 1 that a controller scales" in note for note in found.notes)
+
+
+def test_observations_that_come_next_are_no_states(robomimic):
+    names = [column.name for column in uc.inspect(robomimic[0]).columns]
+    assert any(name.startswith("next_obs") for name in names)
+    assert "next_obs" not in (uc.inspect(robomimic[0]).next or "")
+
+
+def test_a_data_frame_of_pandas_has_its_names(tmp_path):
+    x = np.random.default_rng(0).normal(size=(60, 2))
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        group = file.create_group("run")
+        group.attrs["pandas_type"] = b"frame"
+        group["axis1"] = np.arange(60)
+        group["block0_items"] = np.array([b"px", b"py"])
+        group["block0_values"] = x
+        group["block1_items"] = np.array([b"t"])
+        group["block1_values"] = np.arange(60, dtype="f4")[:, None] / 10
+    demos = uc.load(tmp_path / "a.h5", state=["run/px", "run/py"])
+    np.testing.assert_array_equal(demos.states, x)
+    np.testing.assert_allclose(demos.time, np.arange(60) / 10, atol=1e-5)

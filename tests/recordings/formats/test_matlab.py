@@ -267,3 +267,66 @@ def test_wiping(name, samples, stopped):
     assert any("time is counted in steps of 0.009" in note for note in demos.notes)
     streamed = np.concatenate([block.actions for block in source.blocks(1000)])
     np.testing.assert_array_equal(streamed, demos.actions)
+
+
+@pytest.mark.parametrize("axes", [(2, 1, 0), (1, 2, 0)])
+def test_arrays_of_three_axes_count_demonstrations_along_the_last(tmp_path, axes):
+    batch = np.random.default_rng(0).normal(size=(7, 60, 4))
+    scipy.io.savemat(tmp_path / "m.mat", {"Data": batch.transpose(axes), "dt": 0.05})
+    demos = uc.load(tmp_path / "m.mat", state="Data")
+    assert demos.n_episodes == 7
+    np.testing.assert_array_equal(demos.states, batch.reshape(-1, 4))
+    assert any("7 demonstrations found in the last axis of Data" in note for note in demos.notes)
+
+
+def test_poses_of_three_axes_are_one_demonstration(tmp_path):
+    scipy.io.savemat(tmp_path / "m.mat", {"H": np.random.default_rng(0).normal(size=(4, 4, 60)), "dt": 0.05})
+    demos = uc.load(tmp_path / "m.mat", state="H")
+    assert (demos.n_episodes, demos.states.shape) == (1, (60, 16))
+
+
+def test_the_goal_of_a_demonstration_is_a_column(tmp_path):
+    parts = [{"x": x, "u": u, "aim": x[-1:]} for x, u in movements((50, 60))]
+    scipy.io.savemat(tmp_path / "m.mat", {"demos": structs(parts), "dt": 0.05})
+    by_column = uc.load(tmp_path / "m.mat", state="x", relative_to="goal", action="u", action_is="velocity")
+    named = uc.load(tmp_path / "m.mat", state="x", relative_to="aim", action="u")
+    np.testing.assert_allclose(by_column.states, named.states)
+    found = uc.inspect(tmp_path / "m.mat")
+    assert {column.kind for column in found.columns if column.name.startswith("aim")} == {"constant"}
+
+
+def test_a_single_cell_of_version_7_3_is_not_the_field_of_a_struct(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "m.mat", "w", userblock_size=512) as file:
+        cell = file.create_dataset("demos", (2, 1), dtype=h5py.ref_dtype)
+        cell.attrs["MATLAB_class"] = np.bytes_("cell")
+        for i, (x, u) in enumerate(movements((50, 60))):
+            group = file.create_group(f"#refs#/{'ab'[i]}")
+            group["x"], group["u"] = x.T, u.T
+            cell[i, 0] = group.ref
+    with (tmp_path / "m.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file")
+    demos = uc.load(tmp_path / "m.mat", state="x", action="u")
+    assert demos.n_episodes == 2
+    assert any("2 demonstrations found in demos" in note for note in demos.notes)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (
+            b"\x06\x00\x00\x00\x00\x00\x00\x00\x05\x00\x00\x00",
+            b"\x06\x08\x00\x00\x00\x00\x00\x00\x05\x00\x00\x00",
+        ),
+        (b"\x09\x00\x00\x00\xe0\x01\x00\x00", b"\xf1\x00\x00\x00\xe0\x01\x00\x00"),
+    ],
+    ids=["no imaginary part", "no such type"],
+)
+def test_damage_at_which_scipy_would_end_the_program_is_a_sentence(tmp_path, before, after):
+    path = tmp_path / "m.mat"
+    scipy.io.savemat(path, {"x": np.random.default_rng(0).normal(size=(20, 3))})
+    content = path.read_bytes()
+    assert before in content
+    path.write_bytes(content.replace(before, after))
+    with pytest.raises(DataError, match="is damaged or not a MATLAB file"):
+        uc.load(path, state="x", rate=1)

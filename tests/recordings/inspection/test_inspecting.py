@@ -270,9 +270,9 @@ def test_the_tables_of_a_file_are_listed_and_looked_into(tmp_path, monkeypatch):
     path = write(tmp_path / "a.csv", t=t, x=np.cos(phase), y=np.sin(phase))
     monkeypatch.setattr("unconstrain.recordings.recognizing.recognize", Topical)
     found = uc.inspect(path)
-    assert found.notes[:2] == (
-        "topic /odom (nav_msgs/msg/Odometry, 300 messages)",
-        "topic /status (std_msgs/msg/String, 3 messages)",
+    assert found.notes[0] == (
+        "the topics that may hold a movement are /odom (nav_msgs/msg/Odometry, 300 messages), "
+        "/status (std_msgs/msg/String, 3 messages); --topic chooses others"
     )
     assert kinds(found) == ["time", "position", "position"]
     assert say("inspect", path, "--keys")[1].splitlines()[0] == "/odom (nav_msgs/msg/Odometry, 300 messages)"
@@ -340,3 +340,26 @@ def test_whatever_numbers_are_in_a_table_there_is_an_answer_or_a_sentence(tmp_pa
     code, said = say("inspect", path, "--json")
     assert code in (0, 2)
     assert code == 2 or set(json.loads(said)) >= {"rows", "next"}
+
+
+def test_stamps_that_are_too_coarse_are_counted(tmp_path):
+    t, phase = circles()
+    path = write(tmp_path / "a.csv", time=np.floor(t), x=np.cos(phase), y=np.sin(phase))
+    found = uc.inspect(path)
+    assert "--rate 50" in found.next
+    assert "--time" not in found.next
+    assert found.rate_hz == 50
+    assert any("one stamp for many samples in a row" in note and "--rate" in note for note in found.notes)
+
+
+def test_the_error_of_a_position_is_no_position_though_in_metres(tmp_path):
+    t, phase = circles()
+    path = tmp_path / "a.csv"
+    rows = zip(t, np.cos(phase), np.abs(np.sin(phase)), strict=True)
+    path.write_text("t,px,Mean Marker Error\ns,m,m\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows))
+    found = uc.inspect(path)
+    assert [(column.kind, column.unit) for column in found.columns[1:]] == [
+        ("position", "m"),
+        ("number", "m"),
+    ]
+    assert "--state px " in found.next

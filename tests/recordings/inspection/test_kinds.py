@@ -130,3 +130,60 @@ def test_the_derivative_explains_the_motion_in_any_unit_and_other_numbers_do_not
     assert explained_by(X, V, t, own) > 0.98
     assert explained_by(X, X, t, own) < 0.7
     assert explained_by(X, V * 0, t, own) == pytest.approx(0)
+
+
+def quaternion(n=50):
+    angle = np.linspace(0.1, 1.0, n)
+    return [0 * angle, np.sin(angle / 2) * 0.6, np.sin(angle / 2) * 0.8, np.cos(angle / 2)]
+
+
+def test_a_quaternion_is_of_one_message():
+    names = ["orientation.y", "orientation.z", "orientation.w", "linear.x"]
+    assert not any(report.kind == "quaternion" for report in judge(names, quaternion()))
+    names = [f"orientation.{axis}" for axis in "xyzw"]
+    assert all(report.kind == "quaternion" for report in judge(names, quaternion()))
+
+
+def test_actions_are_no_quaternion():
+    assert not any(
+        report.kind == "quaternion" for report in judge([f"actions[{i}]" for i in range(4)], quaternion())
+    )
+
+
+def test_what_follows_a_pose_in_an_array_is_no_position():
+    wave = np.sin(np.linspace(0, 5, 50))
+    columns = [wave, 2 * wave, 3 * wave, *quaternion(), 10 * wave, 20 * wave]
+    found = judge([f"X[{i}]" for i in range(9)], columns)
+    assert [report.kind for report in found] == ["position"] * 3 + ["quaternion"] * 4 + ["number"] * 2
+
+
+def test_rows_of_pose_matrices():
+    phase = np.linspace(0.0, 3.0, 50)
+    zero, one = np.zeros(50), np.ones(50)
+    matrix = [
+        np.cos(phase),
+        -np.sin(phase),
+        zero,
+        phase,
+        np.sin(phase),
+        np.cos(phase),
+        zero,
+        phase**2,
+        zero,
+        zero,
+        one,
+        -phase,
+    ]
+    found = [report.kind for report in judge([""] * 12, matrix)]
+    assert [i for i, kind in enumerate(found) if kind == "position"] == [3, 7, 11]
+    assert found.count("rotation") == 9
+    assert "rotation" not in [report.kind for report in judge([""] * 12, [*matrix[:10], phase, phase])]
+
+
+def test_frames_and_those_who_are_seen_in_them():
+    frames, tracks = np.repeat(np.arange(20.0) * 10, 2), np.tile([1.0, 2.0], 20)
+    steps = np.linspace(0.0, 5.0, 40)
+    found = [report.kind for report in judge([""] * 4, [frames, tracks, steps, steps**2])]
+    assert found[:2] == ["time", "episode"]
+    found = [report.kind for report in judge([""] * 4, [steps, steps**2, steps, steps])]
+    assert "episode" not in found

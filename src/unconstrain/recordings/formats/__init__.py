@@ -4,7 +4,9 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import Format
 from unconstrain.recordings.formats.c3d import C3D
+from unconstrain.recordings.formats.feather import Feather
 from unconstrain.recordings.formats.hdf5 import Hdf5
+from unconstrain.recordings.formats.json_document import JsonDocument
 from unconstrain.recordings.formats.json_lines import JsonLines
 from unconstrain.recordings.formats.matlab import Matlab, Matlab73
 from unconstrain.recordings.formats.npy import Npy
@@ -17,7 +19,7 @@ from unconstrain.recordings.formats.text_encoding import is_text
 from unconstrain.recordings.formats.xlsx import Xlsx
 
 FORMATS: tuple[type[Format], ...] = (
-    RosBag, Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Xlsx, Npz, C3D, JsonLines, Text,
+    RosBag, Npy, Matlab, Matlab73, Hdf5, Parquet, Saved, Xlsx, Npz, C3D, Feather, JsonDocument, JsonLines, Text,
 )  # fmt: skip
 """In the order in which they are tried."""
 

@@ -3,14 +3,14 @@
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
 import pyarrow as pa
 
 from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns, Key, Keys
 from unconstrain.recordings.files import File
-from unconstrain.recordings.table import Header
+from unconstrain.recordings.table import Header, row
 from unconstrain.spaces import Space
 
 ColumnKey = tuple[str, int]
@@ -18,6 +18,9 @@ ColumnKey = tuple[str, int]
 
 GUESS = b"guess"
 """Where, in the schema's metadata of the rows that it reads, a format says what it guessed of them, a line each."""
+
+MOST_PARTS = 8
+"""Parts of a file that a sentence names."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Declared:
     state_names, action_names, episode_labels, notes : tuple of str, optional
         As `Demonstrations` has them.
     space : Space, optional
+    noise : float, optional
         As `Demonstrations` has it.
     """
 
@@ -52,8 +56,9 @@ class Declared:
     state_names: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
     episode_labels: tuple[str, ...] = ()
-    space: Space | None = None
     notes: tuple[str, ...] = ()
+    space: Space | None = None
+    noise: float | None = None
 
 
 def note_guesses(guesses: Iterable[str]) -> dict[bytes, bytes] | None:
@@ -128,6 +133,110 @@ class Format(Protocol):
         ...
 
 
+class OneFile:
+    """What most formats have in common: they need nothing but their file, and say nothing of its columns.
+
+    Parameters
+    ----------
+    file : File
+    """
+
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    at_once: ClassVar[bool] = True
+
+    def __init__(self, file: File) -> None:
+        self.file = file
+
+    @classmethod
+    def matches(cls, file: File) -> bool:
+        """Whether the content is of this format, as its first bytes tell."""
+        return False
+
+    def declared(self) -> Declared | None:
+        """Return nothing: such files say nothing of their columns but their names."""
+        return None
+
+    def place(self, index: int) -> str:
+        """Say where in the file a row is."""
+        return row(index)
+
+    def in_one_thread(self) -> Self:
+        """Return the same file, decoded by one thread."""
+        return self
+
+    def identity(self) -> str:
+        """Say what tells the content from that of other files."""
+        return repr(self.file.identity())
+
+
+@runtime_checkable
+class HasParts(Protocol):
+    """What a format does too whose files may hold several tables side by side, of which one is read."""
+
+    part: str | None
+    """The one that the user names."""
+
+    def parts(self) -> tuple[str, ...]:
+        """Return what there is to choose from: sheets, sections of an export, files of an archive."""
+        ...
+
+    def for_part(self, name: str) -> Format:
+        """Return the same file, of which nothing but this part is read. That it is not there, `columns` says."""
+        ...
+
+
+def note_part(taken: str, every: Sequence[str]) -> str:
+    """Say which part of a file is read, and which option names another one.
+
+    Parameters
+    ----------
+    taken : str
+    every : sequence of str
+
+    Returns
+    -------
+    str
+    """
+    others = [repr(name) for name in every if name != taken]
+    more = f" and {len(others) - MOST_PARTS} more" if len(others) > MOST_PARTS else ""
+    return (
+        f"of its parts {taken!r} is read; part= names another one, of {', '.join(others[:MOST_PARTS])}{more}"
+    )
+
+
+def find_part(name: str | None, every: Sequence[str], shown: str) -> str | None:
+    """Return the part that a name stands for, or None without a name.
+
+    Parameters
+    ----------
+    name : str or None
+        In whatever case, or the last part of a path.
+    every : sequence of str
+    shown : str
+        The file, as the user calls it.
+
+    Returns
+    -------
+    str or None
+
+    Raises
+    ------
+    DataError
+        There is none of that name.
+    """
+    if name is None:
+        return None
+    alike = [each for each in every if name.lower() in (each.lower(), each.lower().rsplit("/", 1)[-1])]
+    if name in every or alike:
+        return name if name in every else alike[0]
+    more = f" and {len(every) - MOST_PARTS} more" if len(every) > MOST_PARTS else ""
+    raise DataError(
+        f"{shown} has no part {name!r}; its parts are {', '.join(map(repr, every[:MOST_PARTS]))}{more}"
+        if every
+        else f"{shown} has no parts of which part= could name one: leave it out"
+    )
+
+
 @runtime_checkable
 class HasTopics(Protocol):
     """What a format does too whose files hold several tables, of which the user names some: topics of a bag."""
@@ -167,6 +276,33 @@ def narrow(opened: Format, topics: tuple[str, ...]) -> Format:
     if not isinstance(opened, HasTopics):
         raise DataError(f"{opened.file.shown} has no topics, as only ROS bags have: leave out topic=")
     return opened.for_topics(topics)
+
+
+def narrow_to_part(opened: Format, part: str | None) -> Format:
+    """Return a file of which one part is read.
+
+    Parameters
+    ----------
+    opened : Format
+    part : str or None
+        None for a file as it is.
+
+    Returns
+    -------
+    Format
+
+    Raises
+    ------
+    DataError
+        A part is given, and files of this format have none.
+    """
+    if part is None:
+        return opened
+    if not isinstance(opened, HasParts):
+        raise DataError(
+            f"{opened.file.shown} has no sheets, sections or sets to choose from: leave out part="
+        )
+    return opened.for_part(part)
 
 
 @contextmanager

@@ -12,7 +12,9 @@ from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
+from unconstrain.recordings.formats.parquet import UNIT
 from unconstrain.recordings.formats.tabular import Tabular
+from unconstrain.recordings.units import plain_unit
 
 
 class C3D(Tabular):
@@ -68,14 +70,17 @@ class C3D(Tabular):
         for i, name in enumerate(names):
             for j, axis in enumerate("XYZ"):
                 columns[f"{name}.{axis}"] = pa.array(positions[j, i], from_pandas=True)
-        unit = next(iter(about.get("UNITS", {}).get("value", [])), "")
+        unit = plain_unit(next(iter(about.get("UNITS", {}).get("value", [])), ""))
         notes = [f"time is made of the frame numbers and the rate of the header, {rate:g} Hz"]
-        if unit:
-            notes.append(f"units are {unit}, as the header says, and not converted")
         if n_channels:
             channels = f"{n_channels} analog channel" + ("s" if n_channels > 1 else "")
             notes.append(f"only points are read: {channels} left out")
-        return pa.table(columns), tuple(notes)
+        table = pa.table(columns)
+        units = ["s", *[unit] * (len(columns) - 1)]
+        fields = [
+            field.with_metadata({UNIT: own.encode()}) for field, own in zip(table.schema, units, strict=True)
+        ]
+        return table.cast(pa.schema(fields)), tuple(notes)
 
 
 def _names(about: Any, n_points: int) -> list[str]:

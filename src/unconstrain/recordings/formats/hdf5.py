@@ -1,7 +1,7 @@
 """HDF5 files: robomimic, robosuite, ALOHA, and any other whose groups repeat."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, ClassVar
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.nested import RATES, STEPS, Fetch, Nested
+from unconstrain.recordings.formats.base import damage_named
+from unconstrain.recordings.formats.layout import RATES, STEPS
+from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -22,8 +24,11 @@ BLOCKS = (512, 1024, 2048)
 MAY_BEGIN_LATER = (".hdf5", ".h5", ".mat")
 """Suffixes of files that are looked at further than at their beginning, which for others would be a request more."""
 
-ENVIRONMENT = "env_args"
+ENVIRONMENTS = ("env_args", "env_info")
 """Where robomimic and robosuite say how often a robot was controlled."""
+
+MASKS = "mask"
+"""The group in which robomimic keeps lists of demonstrations, to train and to validate."""
 
 DEEPEST = 32
 """Groups within groups."""
@@ -53,6 +58,22 @@ class Hdf5(Nested):
         with self._open() as opened:
             node = self.node(opened, opened, ())
         return node if isinstance(node, dict) else {"root": node}
+
+    def choose(self, tree: dict[str, Node], part: str) -> dict[str, Node]:
+        """Return a part of the tree, or the demonstrations that a list in the file names, as robomimic's masks do."""
+        with damage_named(self.file.shown, self.kind), self._open() as opened:
+            names = self._listed(opened, (part, f"{MASKS}/{part}"))
+        return super().choose(tree, part) if names is None else _keep(tree, names)
+
+    def _listed(self, opened: Any, paths: Sequence[str]) -> frozenset[str] | None:
+        """Return the names in a list of names at one of some paths."""
+        h5py = _library(self.file.shown)
+        for path in paths:
+            item = opened.get(path)
+            if isinstance(item, h5py.Dataset) and item.ndim == 1 and h5py.check_string_dtype(item.dtype):
+                self.check_size(item)
+                return frozenset(item.asstr()[()].tolist())
+        return None
 
     @contextmanager
     def opened(self) -> Iterator[Fetch]:
@@ -89,6 +110,7 @@ class Hdf5(Nested):
         if item.id in above:
             return Odd("is a group that contains itself")
         inner: dict[str, Node] = {}
+        steps = [*_steps(item)]
         for name in item:
             if name in ("#refs#", "#subsystem#"):  # where MATLAB keeps what cells refer to
                 continue
@@ -100,9 +122,31 @@ class Hdf5(Nested):
                 inner[name] = Odd("is a link to nothing")
                 continue
             inner[name] = self.node(part, opened, (*above, item.id))
-        for name, number in _steps(item):
+            steps += _steps(part) if isinstance(part, h5py.Dataset) else ()
+        if item.attrs.get("pandas_type") is not None:
+            return self.frame(item, inner)
+        for name, number in steps:
             inner.setdefault(name, Leaf((), number.dtype, number))
         return inner
+
+    def frame(self, group: Any, inner: dict[str, Node]) -> dict[str, Node]:
+        """Describe the columns of a data frame that pandas wrote, whose columns of one type are a block."""
+        columns: dict[str, Node] = {}
+        for name, node in inner.items():
+            items = group.get(name.replace("_values", "_items"))
+            if not (
+                name.endswith("_values")
+                and isinstance(node, Leaf)
+                and len(node.shape) == 2
+                and items is not None
+            ):
+                continue
+            names = [
+                each.decode(errors="replace") if isinstance(each, bytes) else str(each) for each in items[()]
+            ]
+            fields = ((name, (slice(None), i)) for i, name in enumerate(names[: node.shape[1]]))
+            columns |= {name: Leaf(node.shape[:1], node.kind, (node.where, field)) for name, field in fields}
+        return columns or inner
 
     def leaf(self, item: Any) -> Leaf:
         """Describe an array."""
@@ -118,7 +162,7 @@ class Hdf5(Nested):
             for name, kind in fields.items()
         }
 
-    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+    def fetch(self, item: Any, index: tuple[Any, ...] | None) -> NDArray[Any]:
         """Read an array."""
         return item[()] if index is None else item[index]
 
@@ -137,6 +181,16 @@ class Hdf5(Nested):
             yield opened
 
 
+def _keep(tree: dict[str, Node], names: frozenset[str]) -> dict[str, Node]:
+    """Return a tree in which, where some groups have one of these names, the others beside them are missing."""
+    some = any(name in names and isinstance(node, dict) for name, node in tree.items())
+    return {
+        name: _keep(node, names) if isinstance(node, dict) and not some else node
+        for name, node in tree.items()
+        if not some or name in names or not isinstance(node, dict)
+    }
+
+
 def is_hdf5(file: File) -> bool:
     """Whether a file holds HDF5, at its beginning or after a block of the user's."""
     if file.magic.startswith(MAGIC):
@@ -147,17 +201,18 @@ def is_hdf5(file: File) -> bool:
     return any(begin[at : at + len(MAGIC)] == MAGIC for at in BLOCKS)
 
 
-def _steps(group: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the attributes of a group that say how far samples are apart."""
-    for name in group.attrs:
+def _steps(item: Any) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the attributes of a group or an array that say how far samples are apart."""
+    for name in item.attrs:
         if name.lower() in STEPS | RATES:
-            number = np.asarray(group.attrs[name])
+            number = np.asarray(item.attrs[name])
             if number.dtype.kind in "iuf" and number.size == 1:
                 yield name, number.reshape(())
-        elif name == ENVIRONMENT:
+        elif name in ENVIRONMENTS:
             try:
-                rate = float(json.loads(group.attrs[name])["env_kwargs"]["control_freq"])
-            except (ValueError, KeyError, TypeError, RecursionError):
+                about = json.loads(item.attrs[name])
+                rate = float(about.get("env_kwargs", about)["control_freq"])
+            except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
                 continue
             yield "control_freq", np.array(rate)
 

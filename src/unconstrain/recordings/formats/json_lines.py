@@ -1,4 +1,4 @@
-"""JSON Lines: an object a line, whose members are the columns; also one array of such objects."""
+"""JSON Lines: an object a line, whose members are the columns."""
 
 import json
 from typing import Any, ClassVar
@@ -7,7 +7,6 @@ import pyarrow as pa
 import pyarrow.json
 
 from unconstrain.errors import DataError
-from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.tabular import Tabular
@@ -25,37 +24,29 @@ class JsonLines(Tabular):
     file : File
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = (".jsonl", ".ndjson", ".json")
+    suffixes: ClassVar[tuple[str, ...]] = (".jsonl", ".ndjson")
 
     @classmethod
     def matches(cls, file: File) -> bool:
-        """Whether the text begins with an object."""
-        if file.magic.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["):
-            return False
+        """Whether the text begins with an object on a line of its own."""
         try:
-            text, is_all, _ = begin_text(file)
-        except DataError:
-            return False
-        text = text.strip()
-        if text[:1] == b"[":
-            return text[1:].lstrip()[:1] == b"{"
-        first = text if is_all and b"\n" not in text else text.split(b"\n")[0]
-        try:
-            return isinstance(json.loads(first), dict)
-        except (ValueError, RecursionError):
+            text, _, _ = begin_text(file)
+            return isinstance(json.loads(text.strip().split(b"\n")[0]), dict)
+        except (DataError, ValueError, RecursionError):
             return False
 
     def load_table(self) -> tuple[Any, tuple[str, ...]]:
         """Return all columns, and what was guessed of the encoding."""
         text, notes = read_text(self.file)
+        text = text.removeprefix(b"\xef\xbb\xbf")
+        lines = text.rstrip(b"\r\n").rsplit(b"\n", 1)
+        if len(lines) > 1 and not text.endswith(b"\n") and not _is_object(lines[1]):
+            text = lines[0]
+            notes = (*notes, "the last line is cut off, and left out")
         with damage_named(self.file.shown, "JSON Lines, with an object of the same members a line"):
-            if text.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"[":
-                check_memory(30.0 * len(text), f"reading {self.file.shown}", "write it as Parquet")
-                return pa.Table.from_pylist(json.loads(text.decode("utf-8-sig"))), notes
             try:
                 table = pyarrow.json.read_json(
-                    pa.BufferReader(text.removeprefix(b"\xef\xbb\xbf")),
-                    read_options=pyarrow.json.ReadOptions(block_size=LONGEST_LINE),
+                    pa.BufferReader(text), read_options=pyarrow.json.ReadOptions(block_size=LONGEST_LINE)
                 )
             except pa.ArrowInvalid as error:
                 reason = " ".join(str(error).split())
@@ -64,3 +55,10 @@ class JsonLines(Tabular):
                     "members of the same types"
                 ) from error
         return table, notes
+
+
+def _is_object(line: bytes) -> bool:
+    try:
+        return isinstance(json.loads(line), dict)
+    except (ValueError, RecursionError):
+        return False

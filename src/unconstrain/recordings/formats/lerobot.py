@@ -18,7 +18,12 @@ from unconstrain.recordings.files import File, Folder, named_errors
 
 STATE, ACTION, EPISODE, TIME = "observation.state", "action", "episode_index", "timestamp"
 ABOUT = "meta/info.json"
+REVISION = "refs/main"
+"""In the cache of the hub, the file that names the folder, below `snapshots`, in which a dataset is."""
+
 VERSIONS = ("v2.0", "v2.1", "v3.0")
+LONGEST_REVISION = 100
+
 LARGEST_ABOUT = 64_000_000
 """Bytes of an `info.json` that is none."""
 
@@ -71,6 +76,28 @@ class LeRobot:
             return f"{column}[{names.index(key)}]" if key in names and key not in self.features else key
 
         return by_place(keys) if isinstance(keys, Key) else [by_place(key) for key in keys]
+
+
+def find_snapshot(folder: Folder) -> Folder:
+    """Return the dataset that a folder of the hub's cache holds, or the folder itself where it is another.
+
+    Parameters
+    ----------
+    folder : Folder
+
+    Returns
+    -------
+    Folder
+    """
+    revision = folder.file(REVISION)
+    with named_errors(folder.shown):
+        if revision.info.type != pyarrow.fs.FileType.File:
+            return folder
+        name = revision.begin(LONGEST_REVISION).decode(errors="replace").strip()
+    inner = folder.file(f"snapshots/{name}")
+    with named_errors(folder.shown):
+        is_there = name.isalnum() and inner.info.type == pyarrow.fs.FileType.Directory
+    return Folder(inner.shown, inner.path, inner.filesystem) if is_there else folder
 
 
 def recognize(folder: Folder) -> LeRobot | None:

@@ -14,6 +14,7 @@ from unconstrain.memory import available_memory, check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.hdf5 import Hdf5, is_hdf5
+from unconstrain.recordings.formats.matlab_checking import check_variables
 from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
@@ -39,6 +40,7 @@ class Matlab(Nested):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
+    episodes_last: ClassVar[bool] = True
     at_once: ClassVar[bool] = True
     kind: ClassVar[str] = "a MATLAB file"
 
@@ -66,6 +68,8 @@ class Matlab(Nested):
         with damage_named(shown, self.kind):
             needed = len(data) + GROWTH * float(_count_inflated(data))
             check_memory(needed, f"reading {shown}", "write a file a demonstration, or save it with -v7.3")
+            if 0 not in data[:4]:
+                check_variables(data)
             # Cells of a shape that the file cannot hold would be allocated before they are read.
             content: Any = io.BytesIO(data)
             for _, shape, _ in scipy.io.whosmat(content):
@@ -85,6 +89,7 @@ class Matlab73(Hdf5):
     """
 
     suffixes: ClassVar[tuple[str, ...]] = ()
+    episodes_last: ClassVar[bool] = True
     separator: ClassVar[str] = "."
     kind: ClassVar[str] = "a MATLAB file"
 
@@ -99,7 +104,8 @@ class Matlab73(Hdf5):
 
         if not isinstance(item, h5py.Dataset):
             fields = super().node(item, opened, above)
-            return _struct_array(fields) if isinstance(fields, dict) else fields
+            # The file itself is no struct: a single variable that is a cell is not the field of one.
+            return _struct_array(fields) if isinstance(fields, dict) and above else fields
         about = item.attrs
         kind = about.get("MATLAB_class", b"")
         kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
@@ -119,7 +125,7 @@ class Matlab73(Hdf5):
         stored = super().leaf(item)
         return Leaf(stored.shape[::-1], stored.kind, stored.where)
 
-    def fetch(self, item: Any, index: int | None) -> NDArray[Any]:
+    def fetch(self, item: Any, index: tuple[Any, ...] | None) -> NDArray[Any]:
         """Read an array with its axes as MATLAB shows them."""
         array = super().fetch(item, None).T
         return array if index is None else array[index]

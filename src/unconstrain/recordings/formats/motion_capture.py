@@ -3,7 +3,10 @@
 import csv
 from collections.abc import Sequence
 
-from unconstrain.recordings.formats.text_layout import NUMBER, FrameTime, Layout, split_line
+from unconstrain.recordings.formats.base import note_part
+from unconstrain.recordings.formats.text_lines import NUMBER, Layout, split_line
+from unconstrain.recordings.formats.text_made import FrameTime, Made
+from unconstrain.recordings.units import plain_unit
 
 WANTED = "Trajectories"
 """The part of a Vicon export that holds where markers are."""
@@ -12,7 +15,22 @@ LARGEST_HEADER = 40
 """Lines among which the names of columns stand."""
 
 
-def find_vicon(lines: Sequence[str]) -> Layout | None:
+def sections(lines: Sequence[str]) -> tuple[str, ...]:
+    """Return the titles of the parts of an export of Vicon Nexus; none where another program wrote the text.
+
+    Parameters
+    ----------
+    lines : sequence of str
+
+    Returns
+    -------
+    tuple of str
+    """
+    heads = _heads(lines)
+    return tuple(_title(lines, i) for i in heads) if heads and heads[0] <= LARGEST_HEADER else ()
+
+
+def find_vicon(lines: Sequence[str], part: str | None = None) -> Layout | None:
     """Find the layout of an export of Vicon Nexus.
 
     Each part of it has a title, the rate (Hz), the names of markers or devices, the names of their components, units,
@@ -21,17 +39,22 @@ def find_vicon(lines: Sequence[str]) -> Layout | None:
     Parameters
     ----------
     lines : sequence of str
+    part : str, optional
+        The title of the part that is read, in whatever case; by default the trajectories, or else the first.
 
     Returns
     -------
     Layout or None
-        Of the trajectories, if there are any; None where another program wrote the text.
+        None where another program wrote the text, or there is no such part.
     """
-    heads = [i for i, line in enumerate(lines) if i > 2 and _bare(line).startswith("framesubframe")]
-    if not heads or heads[0] > LARGEST_HEADER:
+    titles = sections(lines)
+    if not titles:
         return None
-    titles = [lines[i - 3].strip(' ",;\t') for i in heads]
-    chosen = titles.index(WANTED) if WANTED in titles else 0
+    heads = _heads(lines)
+    wanted = [title for title in titles if title.lower() == (part or WANTED).lower()]
+    if part is not None and not wanted:
+        return None
+    chosen = titles.index(wanted[0]) if wanted else 0
     at = heads[chosen]
     delimiter = next((mark for mark in "\t;," if mark in lines[at]), ",")
     try:
@@ -44,7 +67,7 @@ def find_vicon(lines: Sequence[str]) -> Layout | None:
     if not per_second > 0:
         return None
     width = max(len(called), len(units))
-    called, named = called + [""] * (width - len(called)), named + [""] * (width - len(named))
+    called, named = (row[:width] + [""] * (width - len(row)) for row in (called, named))
     names = ["Frame", "Sub Frame"]
     owner = ""
     for name, component in zip(named[2:], called[2:], strict=True):
@@ -52,14 +75,13 @@ def find_vicon(lines: Sequence[str]) -> Layout | None:
         names.append(_join(owner, component.strip()))
     has_units = not any(NUMBER.fullmatch(cell) for cell in units)
     notes = [f"time is made of the frame numbers and the rate of the header, {per_second:g} Hz"]
-    if has_units:
-        notes += _note_units(units[2:])
-    if len(titles) > 1:
-        others = ", ".join(title for i, title in enumerate(titles) if i != chosen)
-        notes.append(f"of its parts {titles[chosen]} is read; cut the file apart to read {others}")
+    if len(titles) > 1 and part is None:
+        notes.append(note_part(titles[chosen], titles))
+    own = [plain_unit(cell) for cell in units] if has_units else []
+    own = (own + [""] * width)[:width]
     return Layout(
-        delimiter, width, (*names, "time"), (*range(width), None), at + 1 + has_units, tuple(notes),
-        FrameTime(0, 1, per_second), is_padded=True, ends_at_blank=True,
+        delimiter, width, (*names, "time"), (*range(width), FrameTime(0, 1, per_second)), at + 1 + has_units,
+        tuple(notes), (*own, "s"), is_padded=True, ends_at_blank=True,
     )  # fmt: skip
 
 
@@ -103,19 +125,33 @@ def find_motive(lines: Sequence[str]) -> Layout | None:
     for name, kind, axis in zip(named[1:], kinds[1:], axes[1:], strict=True):
         own = letter.get(kind, "") + axis if axis else kind
         names.append(_join(name, own) if name and name != "Name" else axis)
-    notes = [
-        f"{what} are {said[key].lower()}, as the header says, and not converted"
-        for what, key in (("lengths", "Length Units"), ("rotations", "Rotation Type"))
-        if said.get(key)
-    ]
-    columns: tuple[int | None, ...] = tuple(range(width))
-    time = None
+    lengths, angle = plain_unit(said.get("Length Units", "")), "" if letter["Rotation"] == "Q" else "deg"
+    of_kind = {
+        "Position": lengths,
+        "Rotation": angle,
+        "Mean Marker Error": lengths,
+        "Error Per Marker": lengths,
+    }
+    units = ["", *(of_kind.get(kind, "") for kind in kinds[1:])]
+    notes = []
+    if angle:
+        notes.append(f"rotations are Euler angles in the order {said['Rotation Type']}, as the header says")
+    columns: tuple[int | Made, ...] = tuple(range(width))
     rate = said.get("Export Frame Rate") or said.get("Capture Frame Rate") or ""
     if not any(name.startswith("Time") for name in names) and NUMBER.fullmatch(rate) and float(rate) > 0:
-        time = FrameTime(0, None, float(rate))
-        names, columns = [*names, "time"], (*columns, None)
+        names, columns = [*names, "time"], (*columns, FrameTime(0, None, float(rate)))
+        units.append("s")
         notes.append(f"time is made of the frame numbers and the rate of the header, {float(rate):g} Hz")
-    return Layout(",", width, tuple(names), columns, at + 1, tuple(notes), time, is_padded=True)
+    return Layout(",", width, tuple(names), columns, at + 1, tuple(notes), tuple(units), is_padded=True)
+
+
+def _heads(lines: Sequence[str]) -> list[int]:
+    """Return the lines that name the columns of a part."""
+    return [i for i, line in enumerate(lines) if i > 2 and _bare(line).startswith("framesubframe")]
+
+
+def _title(lines: Sequence[str], head: int) -> str:
+    return lines[head - 3].strip(' ",;\t')
 
 
 def _bare(line: str) -> str:
@@ -127,8 +163,3 @@ _NOTHING = str.maketrans("", "", ' ",;\t')
 
 def _join(owner: str, component: str) -> str:
     return f"{owner}.{component}" if owner and component else owner or component
-
-
-def _note_units(units: Sequence[str]) -> list[str]:
-    found = dict.fromkeys(unit for cell in units if (unit := cell.strip()))
-    return [f"units are {', '.join(found)}, as the file says, and not converted"] if found else []

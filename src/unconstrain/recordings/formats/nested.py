@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 import pyarrow as pa
@@ -15,38 +15,18 @@ from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared, damage_named
-from unconstrain.recordings.formats.npz import to_arrow
-from unconstrain.recordings.formats.stacking import Stacked, find_lengths, stack
-from unconstrain.recordings.formats.trees import (
-    Demonstration,
-    Found,
-    Leaf,
-    Node,
-    Odd,
-    find_demonstrations,
-    leaves,
-    numbers_in,
-    outside,
-)
+from unconstrain.recordings.formats.aligning import TIMES, bring, name_of
+from unconstrain.recordings.formats.arrays import to_arrow
+from unconstrain.recordings.formats.base import ColumnKey, Declared, damage_named, note_guesses
+from unconstrain.recordings.formats.layout import MOST_NAMED, Layout, lay_out
+from unconstrain.recordings.formats.trees import Leaf, Node, choose_part
 from unconstrain.recordings.table import Column, Header, row
-
-EPISODE, TIME = "episode", "time"
-"""What the columns are called that the file itself does not have."""
-
-TIMES = frozenset({"t", "time", "times", "timestamp", "timestamps", "time_s", "stamp", "stamps"})
-STEPS = frozenset({"dt", "timestep", "time_step", "sample_time"})
-RATES = frozenset(
-    {"fps", "hz", "fs", "rate", "freq", "frequency", "control_freq", "sample_rate", "sampling_rate"}
-)
-
-MATRICES = ((3, 3), (3, 4), (4, 4))
-"""Shapes of rotations and poses."""
 
 HELD = 0.5
 """Share of steps without a change from which a sensor is taken to have stopped, where elsewhere it changes."""
 
-MOST_NAMED = 5
+MOST_PARTS = 20
+"""Parts of a file that a sentence lists."""
 
 Fetch = Callable[[Leaf], NDArray[Any]]
 
@@ -55,8 +35,9 @@ class Nested:
     """A file that holds a tree of arrays, of which the demonstrations are stacked along time.
 
     A column is called by the path of its array within a demonstration: `pos[0]`, `pos[1]`. The column `episode` tells
-    demonstrations apart. Scalars of a demonstration hold for all its samples; one that is the time step or the rate
-    gives the column `time`, where there is no time.
+    demonstrations apart, or the episodes of a single one, where ends or flags say where these begin. Numbers and short
+    vectors of a demonstration hold for all its samples; a number that is the time step or the rate gives the column
+    `time`, where there is no time. Arrays of another rate are brought to the time.
 
     Parameters
     ----------
@@ -66,16 +47,32 @@ class Nested:
     suffixes: ClassVar[tuple[str, ...]] = ()
     at_once: ClassVar[bool] = False
     separator: ClassVar[str] = "."
+    episodes_last: ClassVar[bool] = False
+    """Whether arrays of three axes count episodes along the last."""
+
     kind: ClassVar[str] = "a file of arrays"
 
     def __init__(self, file: File) -> None:
         self.file = file
         self.time_axis: str | None = None
+        self.part: str | None = None
 
     def with_time_axis(self, axis: str) -> "Nested":
         """Return the same file, in whose demonstrations the first or the last axis is time, as a user says."""
-        other = copy(self)
+        other = self._unread()
         other.time_axis = axis
+        return other
+
+    def parts(self) -> tuple[str, ...]:
+        """Return the sets of demonstrations that there are, the one that is read first."""
+        found = self._table.found
+        own = (*found.path, *(found.members if len(found.members) == 1 else ()))
+        return tuple(self.separator.join(path) for path in dict.fromkeys((own, *found.others)) if path)
+
+    def for_part(self, name: str) -> "Nested":
+        """Return the same file, of which nothing but this part is read. That it is not there, `columns` says."""
+        other = self._unread()
+        other.part = name
         return other
 
     @classmethod
@@ -98,8 +95,9 @@ class Nested:
             columns += [Column(f"{path}[{i}]", kind, rows, 0, path, i, each.width) for i in parts]
         if table.step is not None:
             columns.append(Column(table.time, pa.float64(), rows))
-        if table.found.names:
-            columns.append(Column(table.episode, table.labels.type, rows))
+        if table.tells_episodes:
+            kind = pa.int64() if table.codes is not None else table.labels.type
+            columns.append(Column(table.episode, kind, rows))
         return Header(self.file.shown, columns, lists, table.unusable)
 
     def declared(self) -> Declared | None:
@@ -128,8 +126,7 @@ class Nested:
                     whole = high - low == length
                     values = self._read_one(fetch, which, names, held if whole else None)
                     said = [*guesses, *(held.notes() if begin + high == stop else ())]
-                    about = {GUESS: "\n".join(said)} if said else None
-                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=about)
+                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=note_guesses(said))
                     yield begin + low, batch.slice(low, high - low)
                 begin += length
 
@@ -149,11 +146,11 @@ class Nested:
 
     def identity(self) -> str:
         """Say what tells the file from others."""
-        return repr(self.file.identity())
+        return repr((self.file.identity(), self.part) if self.part else self.file.identity())
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the file alone: what was read of it may be large."""
-        return {"file": replace(self.file), "time_axis": self.time_axis}
+        return {"file": replace(self.file), "time_axis": self.time_axis, "part": self.part}
 
     def tree(self) -> dict[str, Node]:
         """Read what there is in the file. Each format has its own."""
@@ -163,27 +160,49 @@ class Nested:
         """Open the file, and return what reads one of its arrays. Each format has its own."""
         raise NotImplementedError
 
+    def choose(self, tree: dict[str, Node], part: str) -> dict[str, Node]:
+        """Return the part of a tree that the user names. Raises `DataError` where there is none."""
+        shown = self.file.shown
+        chosen = choose_part(tree, part, self.separator)
+        if isinstance(chosen, dict):
+            return chosen
+        if not chosen:
+            raise DataError(f"{shown} has no parts to choose from: leave out part=")
+        more = f" and {len(chosen) - MOST_PARTS} more" if len(chosen) > MOST_PARTS else ""
+        raise DataError(
+            f"{shown} has no part that {part!r} alone stands for; there are {', '.join(chosen[:MOST_PARTS])}{more}"
+        )
+
+    def _unread(self) -> "Nested":
+        """Return the same file, of which nothing is known yet."""
+        other = copy(self)
+        for name in ("_table", "_declared"):
+            vars(other).pop(name, None)
+        return other
+
     @cached_property
-    def _table(self) -> "_Table":
+    def _table(self) -> Layout:
         shown = self.file.shown
         with damage_named(shown, self.kind):
             tree = self.tree()
-            table = _lay_out(tree, self.separator, self.time_axis)
+        if self.part is not None:
+            tree = self.choose(tree, self.part)
+        with damage_named(shown, self.kind):
+            table = lay_out(tree, self.separator, self.time_axis, self.episodes_last)
         if not table.stacked or not sum(table.lengths):
             reasons = [f"{path!r} {reason}" for path, reason in table.unusable.items()]
             why = f" ({'; '.join(reasons[:MOST_NAMED])})" if reasons else ""
             raise DataError(f"{shown} holds no arrays that could be columns{why}")
-        if table.step is None:
+        if table.step is None and not table.borders:
             return table
         with damage_named(shown, self.kind), self.opened() as fetch:
-            steps = np.array(
-                [float(np.asarray(fetch(part)).reshape(-1)[0]) for part in table.step.parts], np.float64
-            )
-        with np.errstate(divide="ignore"):
-            seconds = 1.0 / steps if table.is_rate else steps
-        if not np.all((seconds > 0) & np.isfinite(seconds)):
-            return table._replace(step=None)
-        return table._replace(seconds=tuple(seconds.tolist()))
+            if table.step is not None:
+                table = _with_seconds(table, fetch)
+            for borders in table.borders:
+                codes = borders.episodes(fetch, table.lengths[0])
+                if codes is not None:
+                    return table.with_episodes(borders, codes)
+        return table
 
     @cached_property
     def _declared(self) -> Declared | None:
@@ -195,12 +214,12 @@ class Nested:
                 (
                     path
                     for path in table.stacked
-                    if _last(path, self.separator) in TIMES and self._increases(path)
+                    if name_of(path, self.separator) in TIMES and self._increases(path)
                 ),
                 None,
             )
         )
-        episode = table.episode if table.found.names else None
+        episode = table.episode if table.tells_episodes else None
         if time is episode is None:
             return None
         said = (
@@ -235,6 +254,9 @@ class Nested:
             if name == table.time and table.step is not None:
                 values.append(pa.array(np.arange(length) * table.seconds[which]))
                 continue
+            if name not in parts and table.codes is not None:
+                values.append(pa.array(table.codes))
+                continue
             if name not in parts:
                 values.append(pa.array([table.labels[which].as_py()] * length, table.labels.type))
                 continue
@@ -242,79 +264,18 @@ class Nested:
             array = np.asarray(fetch(each.parts[which]))
             if array.shape != each.parts[which].shape:
                 raise ValueError("an array has another shape than it promises")
-            if each.axes[which] is None:
-                array = np.repeat(array.reshape(-1)[:1], length)
-                if each.width:
-                    array = array[:, None]
+            if each.clocks:
+                own, at = (
+                    np.asarray(fetch(leaf), np.float64).reshape(-1)
+                    for leaf in (each.clocks[which], table.stacked[str(table.clock)].parts[which])
+                )
+                array = bring(each.arrange(which, array, len(own)), own, at[:length])
             else:
-                array = each.arrange(which, array)
-                if held is not None:
-                    held.add(name, array, label)
+                array = each.arrange(which, array, length)
+            if held is not None and not each.is_held:
+                held.add(name, array, label)
             values.append(to_arrow(array.astype(each.kind, copy=False)))
         return values
-
-
-class _Table(NamedTuple):
-    """How the demonstrations of a file become a table."""
-
-    found: Found
-    lengths: tuple[int, ...]
-    stacked: dict[str, Stacked]
-    unusable: dict[str, str]
-    labels: Any
-    episode: str
-    time: str
-    step: Stacked | None
-    step_name: str
-    is_rate: bool
-    beside: tuple[str, ...]
-    time_axis: str | None
-    seconds: tuple[float, ...] = ()
-
-    def guesses(self, names: Sequence[str]) -> list[str]:
-        """Say what was guessed of columns."""
-        said = []
-        if self.episode in names and self.found.names:
-            where = " and ".join(self.found.names[:MOST_NAMED])
-            number = len(self.found.demonstrations)
-            text = f"{number} demonstration{'' if number == 1 else 's'} found in {where}, each an episode"
-            text += "; episode= names another column"
-            if self.beside:
-                more = f" and {len(self.beside) - MOST_NAMED} more" if len(self.beside) > MOST_NAMED else ""
-                text += f"; what lies beside them is not read: {', '.join(self.beside[:MOST_NAMED])}{more}"
-            said.append(text)
-        if self.step is not None and self.time in names:
-            low, high = min(self.seconds), max(self.seconds)
-            step = f"{low:.4g} s" if low == high else f"{low:.4g} to {high:.4g} s"
-            said.append(
-                f"time is counted in steps of {step}, as {self.step_name} says; time= names another column"
-            )
-        orders: dict[str, list[str]] = {}
-        for name in dict.fromkeys(names):
-            if name in self.stacked and self.time_axis is None:
-                order = self._order(self.stacked[name])
-                if order:
-                    orders.setdefault(order, []).append(name)
-        for order, arrays in orders.items():
-            said.append(
-                f"{', '.join(arrays)} {'is' if len(arrays) == 1 else 'are'} read as {order}; time_axis= says "
-                "which axis is time"
-            )
-        return said
-
-    def _order(self, each: Stacked) -> str:
-        """Say in which order of the axes an array is read."""
-        orders: dict[str, list[int]] = {}
-        for which in range(len(each.parts)):
-            orders.setdefault(each.order(which), []).append(which)
-        shown = []
-        for order, several in orders.items():
-            if not order:
-                continue
-            shape = " x ".join(map(str, each.parts[several[0]].shape))
-            count = f" in {len(several)} demonstrations" if len(orders) > 1 else ""
-            shown.append(f"{order} ({shape}){count}")
-        return " and ".join(shown)
 
 
 class _Held:
@@ -351,113 +312,15 @@ class _Held:
         )
 
 
-def _lay_out(tree: dict[str, Node], separator: str, time_axis: str | None) -> _Table:
-    found = _split_batches(find_demonstrations(tree), separator, time_axis)
-    labels = [each.label for each in found.demonstrations]
-    arrays = [
-        {path or found.members[0]: leaf for path, leaf in leaves(each.content, separator)}
-        for each in found.demonstrations
-    ]
-    lengths = find_lengths(arrays, time_axis)
-    stacked, unusable = stack(arrays, lengths, labels, time_axis)
-    stacked = {path: replace(each, kind=_plain(each.kind)) for path, each in stacked.items()}
-    beside = outside(tree, found, separator)
-    for path, node in beside.items():
-        reason = node.reason if isinstance(node, Odd) else "lies beside the demonstrations"
-        unusable.setdefault(path, reason)
-    episode = next(name for name in (EPISODE, "demonstration", "_episode") if name not in stacked)
-    has_time = any(
-        _last(path, separator) in TIMES and not each.width and None not in each.axes
-        for path, each in stacked.items()
-    )
-    step, step_name = None, ""
-    if not has_time:
-        step, step_name = _find_step(stacked, beside, separator, len(labels))
-    text = any(isinstance(label, str) for label in labels)
-    return _Table(
-        found,
-        tuple(lengths),
-        stacked,
-        unusable,
-        pa.array([str(label) for label in labels] if text else labels),
-        episode,
-        TIME if TIME not in stacked else "time_counted",
-        step,
-        step_name,
-        _last(step_name, separator) in RATES,
-        tuple(path for path, node in beside.items() if numbers_in(node) > 1),
-        time_axis,
-    )
-
-
-def _split_batches(found: Found, separator: str, time_axis: str | None) -> Found:
-    """Take arrays (episodes, time, dimensions) apart, where all of a file's arrays are of this form."""
-    if found.names:
-        return found
-    every = dict(leaves(found.demonstrations[0].content, separator))
-    arrays = {path: leaf for path, leaf in every.items() if isinstance(leaf, Leaf) and leaf.size > 1}
-    deep = [leaf.shape for leaf in arrays.values() if len(leaf.shape) == 3]
-    if not deep:
-        return found
-    n_episodes, length = deep[0][0], max(deep[0])
-    if time_axis is not None:
-        length = deep[0][1 if time_axis == "first" else 2]
-    fits = all(
-        shape[0] == n_episodes
-        and max(shape) == length in shape[1:]
-        and not (shape[2] == length and shape[:2] in MATRICES)
-        for shape in deep
-    )
-    others = (leaf.shape for leaf in arrays.values() if len(leaf.shape) != 3)
-    if not fits or any(shape not in ((n_episodes, length), (n_episodes,)) for shape in others):
-        return found
-    rest = {path: node for path, node in every.items() if path not in arrays}
-    demonstrations = tuple(
-        Demonstration(
-            i,
-            {
-                **{path: replace(leaf, shape=leaf.shape[1:], index=i) for path, leaf in arrays.items()},
-                **rest,
-            },
-        )
-        for i in range(n_episodes)
-    )
-    names = (f"the first axis of {', '.join(arrays)}",)
-    return Found((), names, tuple(found.demonstrations[0].content), demonstrations)
-
-
-def _find_step(
-    stacked: dict[str, Stacked], beside: dict[str, Leaf | Odd], separator: str, n_demonstrations: int
-) -> tuple[Stacked | None, str]:
-    """Find the time step or the rate: of each demonstration, or else of the file."""
-    wanted = STEPS | RATES
-    for path, each in stacked.items():
-        if (
-            _last(path, separator) in wanted
-            and each.kind.kind in "iuf"
-            and not any(axis is not None for axis in each.axes)
-        ):
-            return each, path
-    for path, node in beside.items():
-        if isinstance(node, Leaf) and _last(path, separator) in wanted and _is_number(node):
-            parts = (node,) * n_demonstrations
-            return Stacked(parts, (None,) * n_demonstrations, 0, node.kind), path
-    return None, ""
-
-
-def _is_number(leaf: Leaf) -> bool:
-    return leaf.size == 1 and leaf.kind.kind in "iuf"
-
-
-def _last(path: str, separator: str) -> str:
-    return path.rsplit(separator, 1)[-1].strip().lower()
-
-
-def _plain(kind: np.dtype) -> np.dtype:
-    """Return the type in which values are read: one that Arrow has."""
-    if kind.kind == "f" and kind.itemsize not in (4, 8):
-        return np.dtype(np.float32 if kind.itemsize < 4 else np.float64)
-    return kind.newbyteorder("=")
+def _with_seconds(table: Layout, fetch: Fetch) -> Layout:
+    """Read the time step of each demonstration; without one that can be, there is none."""
+    assert table.step is not None
+    steps = np.array([float(np.asarray(fetch(part)).reshape(-1)[0]) for part in table.step.parts], np.float64)
+    with np.errstate(divide="ignore"):
+        seconds = 1.0 / steps if table.is_rate else steps
+    if not np.all((seconds > 0) & np.isfinite(seconds)):
+        return table._replace(step=None)
+    return table._replace(seconds=tuple(seconds.tolist()))
 
 
 def _arrow_type(kind: np.dtype) -> pa.DataType:

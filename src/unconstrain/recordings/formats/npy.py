@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
+from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.nested import Fetch, Nested
 from unconstrain.recordings.formats.trees import Leaf, Node, Odd
 
@@ -42,16 +43,12 @@ class Npy(Nested):
     def tree(self) -> dict[str, Node]:
         """Read the type and shape of the array."""
         with self.file.open() as content:
-            shape, kind = _read_shape(content)
+            shape, kind = read_shape(content)
             held = self.file.info.size - content.tell()
-        if kind.hasobject:
-            return {ARRAY: Odd("holds pickled Python objects, which are not opened: save numbers")}
-        if held != kind.itemsize * int(np.prod(shape, dtype=object)):
+        if not kind.hasobject and held != kind.itemsize * int(np.prod(shape, dtype=object)):
             raise ValueError("the array does not hold what it promises")
-        if not kind.names:
-            return {ARRAY: Leaf(shape, kind, None)}
-        fields = {name: kind.fields[name][0] for name in kind.names if kind.fields is not None}
-        return {name: Leaf((*shape, *each.shape), each.base, name) for name, each in fields.items()}
+        node = fields_of(shape, kind, None)
+        return node if isinstance(node, dict) else {ARRAY: node}
 
     @contextmanager
     def opened(self) -> Iterator[Fetch]:
@@ -61,7 +58,8 @@ class Npy(Nested):
             array = np.lib.format.read_array(content, allow_pickle=False)
 
         def fetch(leaf: Leaf) -> NDArray[Any]:
-            part = array if leaf.where is None else array[leaf.where]
+            _, field = leaf.where
+            part = array if field is None else array[field]
             return part if leaf.index is None else part[leaf.index]
 
         yield fetch
@@ -95,7 +93,7 @@ class NpyFolder(Nested):
 
     def identity(self) -> str:
         """Say what tells the files from others."""
-        return repr([each.identity() for each in self._files])
+        return repr((self.part, [each.identity() for each in self._files]))
 
     def tree(self) -> dict[str, Node]:
         """Read the types and shapes of the arrays."""
@@ -108,9 +106,11 @@ class NpyFolder(Nested):
                 below = inner.setdefault(folder, {})
                 assert isinstance(below, dict)
                 inner = below
+            with damage_named(each.file.shown, each.kind):
+                arrays = each.tree()
             fields = {
                 field: replace(node, where=(number, node.where)) if isinstance(node, Leaf) else node
-                for field, node in each.tree().items()
+                for field, node in arrays.items()
             }
             inner[name] = fields.get(ARRAY, fields)
         return tree
@@ -142,8 +142,42 @@ def _relative(files: Sequence[File]) -> list[tuple[str, ...]]:
     return [path.relative_to(root).with_suffix("").parts for path in paths]
 
 
-def _read_shape(content: Any) -> tuple[tuple[int, ...], np.dtype]:
+def read_shape(content: Any) -> tuple[tuple[int, ...], np.dtype]:
+    """Read the shape and the type of an array from its beginning.
+
+    Parameters
+    ----------
+    content : binary file
+        At the beginning of what `numpy.save` wrote.
+
+    Returns
+    -------
+    shape : tuple of int
+    kind : numpy.dtype
+    """
     version = np.lib.format.read_magic(content)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, kind = read(content)
     return shape, kind
+
+
+def fields_of(shape: tuple[int, ...], kind: np.dtype, where: object) -> Node:
+    """Describe an array, or the fields of an array of records.
+
+    Parameters
+    ----------
+    shape : tuple of int
+    kind : numpy.dtype
+    where : object
+        What finds the array; leaves have it, and the name of their field.
+
+    Returns
+    -------
+    Leaf, Odd, or dict of str to Leaf
+    """
+    if kind.hasobject:
+        return Odd("holds pickled Python objects, which are not opened: save numbers")
+    if kind.names is None or kind.fields is None:
+        return Leaf(shape, kind, (where, None))
+    fields = {name: kind.fields[name][0] for name in kind.names}
+    return {name: Leaf((*shape, *each.shape), each.base, (where, name)) for name, each in fields.items()}

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from unconstrain.recordings.formats.text_layout import Layout, split_line
+from unconstrain.recordings.formats.text_lines import Layout, split_line
+from unconstrain.recordings.units import plain_unit
 
 LARGEST_HEADER = 200
 """Lines among which the header ends."""
@@ -30,9 +31,9 @@ def find_trc(lines: Sequence[str]) -> Layout | None:
     for i in range(2, width):
         owner = (named[i].strip() if i < len(named) else "") or owner
         names.append(f"{owner}.{'XYZ'[(i - 2) % 3]}")
-    unit = said.get("Units", "").strip()
-    notes = (f"units are {unit}, as the header says, and not converted",) if unit else ()
-    return Layout("\t", width, tuple(names), tuple(range(width)), 5, notes, is_padded=True)
+    unit = plain_unit(said.get("Units", ""))
+    units = ("", "s", *[unit] * (width - 2))
+    return Layout("\t", width, tuple(names), tuple(range(width)), 5, (), units, is_padded=True)
 
 
 def find_storage(lines: Sequence[str]) -> Layout | None:

@@ -13,18 +13,21 @@ import pyarrow.parquet as pq
 from unconstrain import demonstrations_file
 from unconstrain.errors import DataError
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import ColumnKey, Declared, damage_named
+from unconstrain.recordings.formats.base import ColumnKey, Declared, OneFile, damage_named
 from unconstrain.recordings.formats.saved import declare
 from unconstrain.recordings.table import Column, Header, is_list, row
 
 DECODED = 131_072
 """Rows decoded at a time: as many as cost little memory, since every start on a column costs time."""
 
+UNIT = b"unit"
+"""Where, in the metadata of a field, a format says what its unit is."""
+
 BUFFERED = 1 << 20
 """Bytes read at a time of each column of a local file."""
 
 
-class Parquet:
+class Parquet(OneFile):
     """A Parquet file, of which only the columns and the row groups asked for are read.
 
     Parameters
@@ -36,9 +39,6 @@ class Parquet:
     at_once: ClassVar[bool] = False
     threads = True
     """Whether columns are decoded side by side."""
-
-    def __init__(self, file: File) -> None:
-        self.file = file
 
     @classmethod
     def matches(cls, file: File) -> bool:
@@ -78,6 +78,7 @@ class Parquet:
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
             batches = opened.iter_batches(DECODED, row_groups=groups, columns=names, use_threads=self.threads)
             while (rows := next(batches, None)) is not None:
+                rows = _flat(rows)
                 if order is None:
                     order = self._order(rows.schema, columns)
                 length, first = len(rows), at
@@ -89,19 +90,11 @@ class Parquet:
         if at != bounds[groups[-1] + 1]:
             raise DataError(f"{self.file.shown} is damaged: rows are missing from it; write it again")
 
-    def place(self, index: int) -> str:
-        """Say where in the file a row is."""
-        return row(index)
-
     def in_one_thread(self) -> "Parquet":
         """Return the same file, decoded by one thread."""
         alike = copy(self)
         alike.threads = False
         return alike
-
-    def identity(self) -> str:
-        """Say what tells the file from others."""
-        return repr(self.file.identity())
 
     def _order(self, schema: pa.Schema, columns: Sequence[ColumnKey]) -> list[int]:
         order = []
@@ -134,7 +127,7 @@ class Parquet:
         if not sum(self.row_groups):
             raise DataError(f"{self.file.shown} has no samples")
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
-            first = next(opened.iter_batches(1))
+            first = _flat(next(opened.iter_batches(1)))
             return describe_columns(first, self.file.shown, sum(self.row_groups))
 
     def _open(self) -> Any:
@@ -148,6 +141,20 @@ class Parquet:
                 page_checksum_verification=True,
             )
         return pq.ParquetFile(self.file.path, buffer_size=BUFFERED, page_checksum_verification=True)
+
+
+def flatten(table: Any) -> Any:
+    """Return a table without records: their components are called `name.component`."""
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
+    return table
+
+
+def _flat(rows: Any) -> Any:
+    """Return a batch without records."""
+    if not any(pa.types.is_struct(field.type) for field in rows.schema):
+        return rows
+    return flatten(pa.Table.from_batches([rows])).combine_chunks().to_batches()[0]
 
 
 def describe_columns(first: Any, shown: str, length: int) -> Header:
@@ -170,11 +177,12 @@ def describe_columns(first: Any, shown: str, length: int) -> Header:
     lists: dict[str, tuple[pa.DataType, int | None]] = {}
     unusable: dict[str, str] = {}
     seen: dict[str, int] = {}
-    for name, values in zip(first.schema.names, first.columns, strict=True):
+    for field, values in zip(first.schema, first.columns, strict=True):
+        name, unit = field.name, (field.metadata or {}).get(UNIT, b"").decode(errors="replace")
         nth = seen[name] = seen.get(name, -1) + 1
         kind = values.type
         if not pa.types.is_nested(kind):
-            columns.append(Column(name, kind, length, nth))
+            columns.append(Column(name, kind, length, nth, unit=unit))
             if pa.types.is_null(kind):
                 lists[name] = kind, length
             continue

@@ -18,8 +18,8 @@ from unconstrain.errors import DataError, printable
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats import rosbag_reading
+from unconstrain.recordings.formats.arrays import to_arrow
 from unconstrain.recordings.formats.base import GUESS, ColumnKey, Declared
-from unconstrain.recordings.formats.npz import to_arrow
 from unconstrain.recordings.formats.rosbag_alignment import align
 from unconstrain.recordings.formats.rosbag_messages import Nanoseconds, TopicTable, Values, read_topic
 from unconstrain.recordings.formats.rosbag_reading import TRANSFORM, Bag, Topic

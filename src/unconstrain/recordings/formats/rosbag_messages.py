@@ -22,6 +22,9 @@ MOST_PARTS = 32
 BATCH_MESSAGES, BATCH_BYTES = 8192, 2**26
 """How many messages are unfolded together, at most."""
 
+MOST_LATE = 20
+"""Places by which messages that arrive in another order than they were sent are apart, at most."""
+
 STAMPS = ("header.stamp", "stamp")
 """Where a message may say when it was measured."""
 
@@ -134,8 +137,29 @@ def read_topic(bag: Bag, topic: Topic, shown: str) -> TopicTable:
         notes.append(
             f"{topic.name} holds {len(received)} messages where the bag's index says {topic.n_messages}"
         )
-    times = np.array(received, dtype=np.int64)
-    return TopicTable(topic, times, stamps, fields, unusable, tuple(notes), unstamped)
+    table = TopicTable(
+        topic, np.array(received, dtype=np.int64), stamps, fields, unusable, tuple(notes), unstamped
+    )
+    return _in_order(table)
+
+
+def _in_order(table: TopicTable) -> TopicTable:
+    """Put messages that arrived a little late into the order of their stamps; where a clock was set back, none."""
+    stamps = table.stamps
+    if stamps is None or np.all(np.diff(stamps) >= 0):
+        return table
+    order = np.argsort(stamps, kind="stable")
+    if np.max(np.abs(order - np.arange(len(order)))) > MOST_LATE:
+        return table
+    fields = {path: replace(each, values=each.values[order]) for path, each in table.fields.items()}
+    moved = int(np.sum(np.diff(stamps) < 0))
+    note = (
+        f"{moved} message{'' if moved == 1 else 's'} of {table.topic.name} came after later ones and are put into "
+        "the order of their stamps"
+    )
+    return replace(
+        table, received=table.received[order], stamps=stamps[order], fields=fields, notes=(*table.notes, note)
+    )
 
 
 VARIES = "holds another number of values in some messages than in others"

@@ -19,6 +19,9 @@ FOLDER_KEY = b"rosbag2_bagfile_information"
 MAGIC = {b"#ROSBAG V": ".bag", b"\x89MCAP": ".mcap", b"SQLite format 3": ".db3"}
 """How bags begin, and the suffix by which `rosbags` knows them."""
 
+COMPRESSED = (".zst", ".zstd")
+"""What the names of the files of a bag end in besides that are compressed as files."""
+
 RECOVERY = {
     ".bag": "rosbag reindex",
     ".mcap": "mcap recover",
@@ -173,7 +176,12 @@ def is_bag_file(file: File) -> bool:
     """Whether a file is a bag, or the description of one."""
     if file.path.endswith(METADATA):
         return FOLDER_KEY in file.begin()
-    return any(file.magic.startswith(magic) for magic in MAGIC)
+    return any(file.magic.startswith(magic) for magic in MAGIC) or _is_compressed(file)
+
+
+def _is_compressed(file: File) -> bool:
+    path = Path(file.path)
+    return path.suffix in COMPRESSED and Path(path.stem).suffix in MAGIC.values()
 
 
 def has_log(file: File) -> bool:
@@ -225,6 +233,11 @@ def opened(file: File) -> Iterator[Bag]:
                 f"{file.shown} is an MCAP file, but not of ROS 2, whose messages alone can be read: write it as CSV or "
                 "Parquet"
             ) from error
+        if kind == ".mcap" and isinstance(error, KeyError):
+            raise DataError(
+                f"{file.shown} holds messages that are not encoded as those of ROS 2 ({error!s:.40}), which alone are "
+                "read: write it as CSV or Parquet"
+            ) from error
         reason = " ".join((str(error) or type(error).__name__).split()).rstrip(".")
         raise DataError(
             f"{file.shown} is damaged, cut short or no ROS bag ({reason:.160}): recover it with `{RECOVERY[kind]}`, or "
@@ -236,6 +249,8 @@ def _kind(file: File) -> str:
     """Return the suffix that belongs to the content, or else the one that there is; none for a folder."""
     if file.path.endswith(METADATA):
         return ""
+    if _is_compressed(file):
+        return Path(Path(file.path).stem).suffix
     own = (suffix for magic, suffix in MAGIC.items() if file.magic.startswith(magic))
     return next(own, file.suffix)
 
@@ -251,9 +266,22 @@ def _on_this_machine(file: File, suffix: str) -> Iterator[Path]:
         raise DataError(f"{file.shown} is a bag of several files elsewhere: copy the folder to this machine")
     with tempfile.TemporaryDirectory() as folder:
         near = Path(folder) / f"bag{suffix}"
-        if file.local:
+        if file.local and not _is_compressed(file):
             near.symlink_to(path.resolve())
         else:
-            with named_errors(file.shown), file.open() as source, near.open("wb") as copy:
+            with named_errors(file.shown), _content(file) as source, near.open("wb") as copy:
                 shutil.copyfileobj(source, copy)
         yield near
+
+
+@contextmanager
+def _content(file: File) -> Iterator[Any]:
+    """Open a file, decompressed."""
+    import pyarrow as pa
+
+    with file.open() as source:
+        if not _is_compressed(file):
+            yield source
+            return
+        with pa.CompressedInputStream(source, "zstd") as unpacked:
+            yield unpacked

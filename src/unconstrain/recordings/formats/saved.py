@@ -1,11 +1,12 @@
 """What this package wrote itself: archives of demonstrations, and demonstrations that are in memory still."""
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,27 +16,21 @@ from unconstrain.demonstrations_file import FORMAT, NAMES
 from unconstrain.errors import ArchiveError, DataError, UnconstrainError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import ColumnKey, Declared
-from unconstrain.recordings.formats.npz import header_of, to_arrow
-from unconstrain.recordings.table import Header, row
+from unconstrain.recordings.formats.arrays import header_of, to_arrow
+from unconstrain.recordings.formats.base import ColumnKey, Declared, OneFile
+from unconstrain.recordings.table import Header
 from unconstrain.spaces import from_description
 from unconstrain.storage import Kind, read
 from unconstrain.storage.archive import NOTE, damaged
 
 
-class Saved:
+class Saved(OneFile):
     """An archive that `Demonstrations.save` wrote, which is read as a whole.
 
     Parameters
     ----------
     file : File
     """
-
-    suffixes: ClassVar[tuple[str, ...]] = ()
-    at_once: ClassVar[bool] = True
-
-    def __init__(self, file: File) -> None:
-        self.file = file
 
     @classmethod
     def matches(cls, file: File) -> bool:
@@ -62,18 +57,6 @@ class Saved:
         """Read samples of these columns as one piece, with its first row."""
         return self._read().read(columns, start, stop)
 
-    def place(self, index: int) -> str:
-        """Say where in the file a sample is."""
-        return row(index)
-
-    def in_one_thread(self) -> "Saved":
-        """Return the same file, decoded by one thread."""
-        return self
-
-    def identity(self) -> str:
-        """Say what tells the file from others."""
-        return repr(self.file.identity())
-
     @cached_property
     def _described(self) -> tuple[Header, Declared | None, tuple[int, ...]]:
         held = self._read()
@@ -97,7 +80,7 @@ class Saved:
         return InMemory(arrays, about, self.file)
 
 
-class InMemory:
+class InMemory(OneFile):
     """Demonstrations that are in memory already, read as a file would be.
 
     Parameters
@@ -110,19 +93,11 @@ class InMemory:
         Where they are from.
     """
 
-    suffixes: ClassVar[tuple[str, ...]] = ()
-    at_once: ClassVar[bool] = True
-
     def __init__(
         self, arrays: Mapping[str, NDArray[Any]], about: dict[str, Any], file: File | None = None
     ) -> None:
         self.file = file or File("these demonstrations", "demonstrations", None)
         self._arrays, self._about = arrays, about
-
-    @classmethod
-    def matches(cls, file: File) -> bool:
-        """Whether a file is of this format: none is."""
-        return False
 
     def columns(self) -> Header:
         """Return the arrays (N,) and (N, k) as columns."""
@@ -144,14 +119,6 @@ class InMemory:
         """Read samples of these columns as one piece, with its first row."""
         values = [to_arrow(self._arrays[name][start:stop]) for name, _ in columns]
         yield start, pa.RecordBatch.from_arrays(values, names=[name for name, _ in columns])
-
-    def place(self, index: int) -> str:
-        """Say which sample it is."""
-        return row(index)
-
-    def in_one_thread(self) -> "InMemory":
-        """Return the same demonstrations."""
-        return self
 
     def identity(self) -> str:
         """Say what tells these demonstrations from others: a digest of the arrays."""
@@ -196,6 +163,10 @@ def declare(about: Any, shown: str) -> Declared:
         projections = roles.get("projections")
         columns = Columns(state, action, single[0], episode)  # type: ignore[arg-type]
         space = from_description(about["space"]) if "space" in about else None
+        noise = about.get("noise")
+        noise = None if noise is None else float(noise)
+        if noise is not None and not 0 <= noise < math.inf:
+            raise ValueError("the noise is none")
     except (UnconstrainError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataError(f"{shown} is damaged and cannot be read as saved demonstrations") from error
     if newer:
@@ -212,4 +183,5 @@ def declare(about: Any, shown: str) -> Declared:
         episode_labels=names["episode_labels"],
         space=space,
         notes=names["notes"],
+        noise=noise,
     )

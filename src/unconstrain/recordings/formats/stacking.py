@@ -1,5 +1,6 @@
 """Arrays of several demonstrations, stacked along time: which axis that is, and what cannot be stacked."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,9 +9,21 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.recordings.formats.trees import WIDEST, Leaf, Odd
+from unconstrain.recordings.formats.trees import MATRICES, WIDEST, Leaf, Odd
 
 Shape = tuple[int, ...]
+
+MOST_HELD = 32
+"""Numbers, at most, of an array that holds for a whole demonstration, as the position of its goal does."""
+
+HELD_FROM = 3
+"""Samples, at least, for each of these numbers: an array that is a little shorter than others is another mistake."""
+
+WIDE, WIDER = 64, 4
+"""How many dimensions, and how many times as many as samples, leave no doubt that an axis is not time."""
+
+SPARE_FROM = 30
+"""Samples of a demonstration from which arrays that have one more are taken to begin with the others."""
 
 
 @dataclass(frozen=True)
@@ -22,17 +35,30 @@ class Stacked:
     parts : tuple of Leaf
         One a demonstration.
     axes : tuple of (int or None)
-        Which axis of each is time; None for a scalar, which holds for all samples of its demonstration.
+        Which axis of each is time; None for a number, vector or matrix that holds for all samples of its demonstration.
     width : int
         Numbers a sample; 0 for an array of one number a sample.
     kind : numpy.dtype
         Of all parts.
+    clocks : tuple of Leaf
+        The stamps of each, where these are others than those of the table; none otherwise.
     """
 
     parts: tuple[Leaf, ...]
     axes: tuple[int | None, ...]
     width: int
     kind: np.dtype
+    clocks: tuple[Leaf, ...] = ()
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it holds for all samples of a demonstration."""
+        return None in self.axes
+
+    def length(self, which: int) -> int | None:
+        """Return the number of samples of a part; None where it holds for all of its demonstration."""
+        axis = self.axes[which]
+        return None if axis is None else self.parts[which].shape[axis]
 
     def order(self, which: int) -> str:
         """Say in which order the axes of a part are; "" where there is but one way to read it."""
@@ -41,11 +67,14 @@ class Stacked:
             return ""
         return "time x dimensions" if axis == 0 else "dimensions x time"
 
-    def arrange(self, which: int, array: NDArray) -> NDArray:
-        """Bring a part, or some of its samples, into the shape (T,) or (T, width)."""
+    def arrange(self, which: int, array: NDArray, length: int) -> NDArray:
+        """Bring a part into the shape (length,) or (length, width)."""
         axis = self.axes[which]
-        rows = np.moveaxis(array, axis or 0, 0)
-        return rows.reshape(len(rows), -1)[:, 0] if not self.width else rows.reshape(len(rows), -1)
+        if axis is None:
+            rows = np.broadcast_to(array.reshape(1, -1), (length, array.size))
+        else:
+            rows = np.moveaxis(array, axis, 0)[:length].reshape(length, -1)
+        return rows if self.width else rows[:, 0]
 
 
 def find_lengths(
@@ -81,7 +110,16 @@ def find_lengths(
         votes[longest] += 1
         votes.update({n for path, axis, n in _axes(arrays, time_axis) if len(lengths_at[path, axis]) > 1})
         found.append(max(votes, key=partial(_rank, votes)))
+    if all(_is_spare(arrays, length) for arrays, length in zip(demonstrations, found, strict=True)):
+        return [length - 1 for length in found]
     return found
+
+
+def _is_spare(arrays: Mapping[str, Leaf | Odd], length: int) -> bool:
+    """Whether other arrays have one sample less, as actions have that lie between observations."""
+    leaves = [node for node in arrays.values() if isinstance(node, Leaf) and node.numbers > 1]
+    fewer = [leaf for leaf in leaves if length - 1 in leaf.shape and length not in leaf.shape]
+    return length > SPARE_FROM and bool(fewer)
 
 
 def stack(
@@ -140,13 +178,21 @@ def _stack_one(
             return node.reason if len(nodes) == 1 else f"{node.reason} in demonstration {label}"
         if node.kind.kind not in "biufUSMm":
             return f"holds values of type {node.kind}"
+        if node.is_image:
+            return "holds bytes along several axes, as images do"
         axis = _time_axis(node.shape, length, leading, strict)
-        if axis is None and node.size != 1:
+        if axis is None and strict and length in node.shape and node.size != 1:
+            return f"has shape {node.shape}, in which time is not the {'first' if leading else 'last'} axis"
+        if axis is None and node.size != 1 and not _may_be_held(node, length, len(nodes) > 1):
+            where = f" in demonstration {label}" if len(nodes) > 1 else ""
+            return f"has shape {node.shape}{where}, of which no axis has the {length} samples that other arrays share"
+        width = node.size if axis is None else node.size // node.shape[axis]
+        if strict and axis is not None and width > WIDE and width > WIDER * node.shape[axis]:
+            opposite = "last" if leading else "first"
             return (
-                f"has shape {node.shape} in demonstration {label}, in which no axis has the {length} samples "
-                "that its arrays share"
+                f"has {width} numbers a sample and but {node.shape[axis]} samples, if time is its "
+                f"{'first' if leading else 'last'} axis: time_axis={opposite} reads it the other way round"
             )
-        width = 1 if axis is None or not length else node.size // length
         if width > WIDEST:
             return f"holds {width} numbers a sample, as images do"
         widths.setdefault(width, label)
@@ -156,7 +202,7 @@ def _stack_one(
         (first, one), (second, other) = list(widths.items())[:2]
         return f"has {first} numbers a sample in demonstration {one} but {second} in {other}"
     if len({axis is None for axis in axes}) > 1:
-        return "is a single number in some demonstrations and one a sample in others"
+        return "holds for all of some demonstrations and changes in others"
     kinds = {"text" if part.kind.kind in "US" else "number" for part in parts}
     if len(kinds) > 1:
         return "holds text in some demonstrations and numbers in others"
@@ -178,11 +224,20 @@ def _usual_order(demonstrations: Sequence[Mapping[str, Leaf | Odd]], lengths: Se
 
 def _time_axis(shape: Shape, length: int, leading: bool, strict: bool) -> int | None:
     places = [axis for axis, size in enumerate(shape) if size == length]
+    if not places and length >= SPARE_FROM:
+        places = [axis for axis, size in enumerate(shape) if size == length + 1]
     if strict and sum(size != 1 for size in shape) > 1:
         places = [axis for axis in places if axis == (0 if leading else len(shape) - 1)]
-    if not places or (length == 1 and int(np.prod(shape, dtype=object)) == 1):
+    if not places or (length == 1 and math.prod(shape) == 1):
         return None
     return places[0] if leading else places[-1]
+
+
+def _may_be_held(leaf: Leaf, length: int, repeats: bool) -> bool:
+    """Whether an array may hold for a whole demonstration: a short vector or, where these repeat, a matrix."""
+    is_vector = sum(size != 1 for size in leaf.shape) < 2
+    fits = leaf.kind.kind in "biuf" and leaf.size <= min(MOST_HELD, length // HELD_FROM)
+    return fits and (is_vector or (repeats and leaf.shape in MATRICES))
 
 
 def _rank(votes: Counter[int], length: int) -> tuple[int, int]:

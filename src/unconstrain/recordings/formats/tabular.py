@@ -2,35 +2,25 @@
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import pyarrow as pa
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.files import File
-from unconstrain.recordings.formats.base import ColumnKey, Declared, note_guesses
-from unconstrain.recordings.formats.parquet import describe_columns
-from unconstrain.recordings.table import Header, row
+from unconstrain.recordings.formats.base import ColumnKey, OneFile, note_guesses
+from unconstrain.recordings.formats.parquet import UNIT, describe_columns, flatten
+from unconstrain.recordings.formats.seconds import with_time
+from unconstrain.recordings.table import Header
+from unconstrain.recordings.units import said_of_units, unit_in
 
 
-class Tabular:
+class Tabular(OneFile):
     """A file that is read as a whole into one Arrow table; a subclass says how, in `load_table`.
 
     Parameters
     ----------
     file : File
     """
-
-    suffixes: ClassVar[tuple[str, ...]] = ()
-    at_once: ClassVar[bool] = True
-
-    def __init__(self, file: File) -> None:
-        self.file = file
-
-    @classmethod
-    def matches(cls, file: File) -> bool:
-        """Whether the content is of this format, as its first bytes tell."""
-        return False
 
     def load_table(self) -> tuple[Any, tuple[str, ...]]:
         """Return all columns as a `pyarrow.Table`, and notes on them. Raises `DataError` for a damaged file."""
@@ -43,10 +33,6 @@ class Tabular:
             raise DataError(f"{self.file.shown} has no samples")
         return describe_columns(table.slice(0, 1).combine_chunks(), self.file.shown, len(table))
 
-    def declared(self) -> Declared | None:
-        """Return nothing: such files say nothing of their columns but their names."""
-        return None
-
     @property
     def row_groups(self) -> tuple[int, ...]:
         """The number of rows."""
@@ -58,6 +44,7 @@ class Tabular:
         """Read rows of these columns as one piece, with its first row."""
         table, notes = self._loaded
         arrays = []
+        units: dict[str, str] = {}
         for name, nth in columns:
             where = [i for i, other in enumerate(table.column_names) if other == name]
             if nth >= len(where):
@@ -66,26 +53,16 @@ class Tabular:
                 )
             column = table.column(where[nth]).slice(start, None if stop is None else stop - start)
             arrays.append(_as_one(column))
+            units[name] = (table.schema.field(where[nth]).metadata or {}).get(UNIT, b"").decode()
         named = [name for name, _ in columns]
+        notes = (*notes, *said_of_units({name: unit or unit_in(name) for name, unit in units.items()}))
         yield start, pa.RecordBatch.from_arrays(arrays, names=named, metadata=note_guesses(notes))
-
-    def place(self, index: int) -> str:
-        """Say where in the file a row is."""
-        return row(index)
-
-    def in_one_thread(self) -> "Tabular":
-        """Return the same file."""
-        return self
-
-    def identity(self) -> str:
-        """Say what tells the file from others."""
-        return repr(self.file.identity())
 
     @cached_property
     def _loaded(self) -> tuple[Any, tuple[str, ...]]:
         table, notes = self.load_table()
-        while any(pa.types.is_struct(field.type) for field in table.schema):
-            table = table.flatten()
+        table, joined = with_time(flatten(table))
+        notes = (*notes, *joined)
         # Polars hands out text as views, which other columns of text do not know.
         views = {i: field for i, field in enumerate(table.schema) if pa.types.is_string_view(field.type)}
         for i, field in views.items():

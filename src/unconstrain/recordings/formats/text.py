@@ -1,32 +1,51 @@
 """Text tables: CSV, TSV and the like, with or without a header."""
 
 from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from itertools import islice
 from typing import ClassVar
 
 import pyarrow as pa
 
+from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats import motion_capture, opensim
-from unconstrain.recordings.formats.base import ColumnKey, Declared, note_guesses
-from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, read_text
-from unconstrain.recordings.formats.text_layout import PROBED, Layout, content, find_layout, lines_of
+from unconstrain.recordings.formats import labview, motion_capture, opensim, qualisys
+from unconstrain.recordings.formats.base import (
+    ColumnKey,
+    Declared,
+    OneFile,
+    damage_named,
+    find_part,
+    note_guesses,
+)
+from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, members, read_text
+from unconstrain.recordings.formats.text_layout import PROBED, find_layout
+from unconstrain.recordings.formats.text_lines import Layout, content, join_header, lines_of
+from unconstrain.recordings.formats.text_made import Part
 from unconstrain.recordings.formats.text_parsing import parse
+from unconstrain.recordings.formats.text_rows import Rows, begins_anew, find_rows
 from unconstrain.recordings.table import Column, Header
+from unconstrain.recordings.units import said_of_units, unit_in
 
-PROGRAMS = (motion_capture.find_vicon, motion_capture.find_motive, opensim.find_trc, opensim.find_storage)
+PROGRAMS = (
+    motion_capture.find_motive, qualisys.find_qualisys, labview.find_labview, opensim.find_trc, opensim.find_storage,
+)  # fmt: skip
 """Programs that write header blocks of their own: each finds the layout where it wrote the text."""
 
+EPISODE = ("episode", "run", "restart")
+"""What the column is called that counts where the header comes again: the first of these that is free."""
 
-class Text:
+
+class Text(OneFile):
     """A text table: CSV, TSV and the like, with or without a header, compressed or not.
 
     All columns are text; they become numbers only where they are used, so other columns may hold anything. Found by
-    itself: the encoding, title lines, the delimiter (tab, semicolon, comma, or spaces), a decimal comma where that is
-    not the delimiter, a header, a line of units, a byte-order mark. Left out: empty lines, and lines that start with
-    `#`, `%` or `//`; the last of these before the data is the header if it names every column, as NumPy's `savetxt`
-    writes.
+    itself: the encoding, title lines, the delimiter (tab, semicolon, bar, comma, or spaces), a decimal comma where that
+    is not the delimiter, a header of one line or several, a line of units, a byte-order mark. Left out: empty lines
+    and lines that start with `#`, `%` or `//`; the last of these before the data is the header if it names every
+    column, as NumPy's `savetxt` writes. Where the header comes again, another episode begins.
 
     Parameters
     ----------
@@ -34,69 +53,117 @@ class Text:
     """
 
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt")
-    at_once: ClassVar[bool] = True
-
-    def __init__(self, file: File) -> None:
-        self.file = file
+    part: str | None = None
+    """The part that is read, where the user names one."""
 
     @classmethod
     def matches(cls, file: File) -> bool:
         """Whether the content is of this format: text has no mark of its own, but if it is compressed."""
         return is_compressed(file)
 
+    def parts(self) -> tuple[str, ...]:
+        """Return the parts of the file, one of which is read: files of an archive, or sections of an export."""
+        return members(self.file) or motion_capture.sections(self._all_lines())
+
+    def for_part(self, name: str) -> "Text":
+        """Return the same file, of which this part is read. That it is not there, `columns` says."""
+        alike = copy(self)
+        for known in ("_layout", "_sheet", "row_groups"):
+            alike.__dict__.pop(known, None)
+        alike.part = name
+        return alike
+
     def columns(self) -> Header:
         """Return the columns, by the header, or without names."""
         columns: list[Column] = []
         seen: dict[str, int] = {}
-        for name, cell in zip(self._layout.names, self._layout.cells, strict=True):
-            seen[name] = seen.get(name, -1) + 1
-            columns.append(Column(name, pa.string() if cell is not None else pa.float64(), None, seen[name]))
-        return Header(self.file.shown, columns)
+        layout = self._layout
+        lists: dict[str, tuple[pa.DataType, int | None]] = {}
+        for place, (name, cell, unit) in enumerate(zip(layout.names, layout.cells, self._units, strict=True)):
+            nth = seen[name] = seen.get(name, -1) + 1
+            kind = pa.string() if isinstance(cell, int) else cell.kind
+            width = layout.widths.get(place, 0)
+            if not width or not name:
+                columns.append(Column(name, kind, None, nth, unit=unit))
+                continue
+            lists[name] = pa.list_(pa.float64()), None
+            columns += [
+                Column(f"{name}[{i}]", pa.float64(), None, nth, name, i, width, unit) for i in range(width)
+            ]
+        return Header(self.file.shown, columns, lists)
 
     def declared(self) -> Declared | None:
-        """Return nothing: text says nothing of its columns but their names."""
-        return None
+        """Return the columns that are made: the time, and the episodes of a logger that began anew."""
+        made = {
+            "episode" if isinstance(cell, Part) else "time": name
+            for name, cell in zip(self._layout.names, self._layout.cells, strict=True)
+            if not isinstance(cell, int)
+        }
+        return Declared(Columns(**made)) if made else None
 
     @cached_property
     def row_groups(self) -> tuple[int, ...]:
         """The number of samples."""
-        return (sum(1 for _ in content(self._read()[0], self._layout)),)
+        return (len(self._rows()[0].lines),)
 
     def read(
         self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
     ) -> Iterator[tuple[int, pa.RecordBatch]]:
         """Read rows of these columns as one piece, with its first row."""
-        data, guesses = self._read()
+        rows, guesses = self._rows()
         names = self._layout.names
         at = [[i for i, other in enumerate(names) if other == name][nth] for name, nth in columns]
-        arrays, found = parse(data, self._layout, at, self.file.shown, self.place)
-        about = note_guesses((*guesses, *self._layout.notes, *found))
-        rows = pa.RecordBatch.from_arrays(arrays, names=[name for name, _ in columns], metadata=about)
-        length = len(rows) if stop is None else stop - start
-        yield start, rows.slice(start, length)
+        arrays, found = parse(rows, self._layout, at, self.file.shown, self.place)
+        units = said_of_units({names[i] or f"column {i}": self._units[i] for i in at})
+        about = note_guesses((*guesses, *self._layout.notes, *rows.notes, *found, *units))
+        batch = pa.RecordBatch.from_arrays(arrays, names=[name for name, _ in columns], metadata=about)
+        length = len(batch) if stop is None else stop - start
+        yield start, batch.slice(start, length)
 
     def place(self, index: int) -> str:
         """Say in which line of the file a row is."""
         # Read again, because only a mistake asks for this.
-        number, _ = next(islice(content(self._read()[0], self._layout), index, None))
-        return f"line {number}"
-
-    def in_one_thread(self) -> "Text":
-        """Return the same file, decoded by one thread."""
-        return self
+        return f"line {self._rows()[0].numbers[index]}"
 
     def identity(self) -> str:
-        """Say what tells the file from others."""
-        return repr(self.file.identity())
+        """Say what tells the part that is read from others."""
+        return repr((self.file.identity(), self.part)) if self.part else super().identity()
+
+    @property
+    def _units(self) -> tuple[str, ...]:
+        layout = self._layout
+        return tuple(
+            unit or unit_in(name)
+            for name, unit in zip(layout.names, layout.units or [""] * len(layout.names), strict=True)
+        )
+
+    @property
+    def _beside(self) -> list[str]:
+        """Lines from elsewhere in the file that may tell the rate."""
+        return []
+
+    @property
+    def _has_tables(self) -> bool:
+        """Whether a part is a table by itself."""
+        return bool(members(self.file))
+
+    def _rows(self) -> tuple[Rows, tuple[str, ...]]:
+        """Return the samples, and what was guessed of the encoding."""
+        data, guesses = self._read()
+        return find_rows(data, self._layout), guesses
 
     def _read(self) -> tuple[bytes, tuple[str, ...]]:
         """Return the whole text in UTF-8, and what was guessed of its encoding."""
-        return read_text(self.file)
+        data, guesses = read_text(self.file, self.part)
+        return join_header(data), guesses
 
     def _begin(self) -> tuple[bytes, bool]:
         """Return the first lines in UTF-8, and whether they are all there are."""
-        data, is_all, _ = begin_text(self.file)
-        return data, is_all
+        data, is_all, _ = begin_text(self.file, self.part)
+        return join_header(data), is_all
+
+    def _all_lines(self) -> list[str]:
+        return [line.decode() for line in lines_of(self._read()[0])]
 
     @cached_property
     def _layout(self) -> Layout:
@@ -105,11 +172,24 @@ class Text:
         if not is_all and sum(1 for _ in islice(content(data), PROBED)) < PROBED:
             data, is_all = self._read()[0], True
         lines = [line.decode() for line in lines_of(data)]
-        for find in PROGRAMS:
-            layout = find(lines)
-            if layout is not None and layout.ends_at_blank and not is_all:
-                # Which part of the text is the one wanted, all of it tells.
-                layout = find([line.decode() for line in lines_of(self._read()[0])])
+        section = None if self._has_tables else self.part
+        if motion_capture.sections(lines):
+            # Which part of the text is the one wanted, all of it tells.
+            lines = lines if is_all else self._all_lines()
+            titles = motion_capture.sections(lines)
+            layout = motion_capture.find_vicon(lines, find_part(section, titles, self.file.shown))
             if layout is not None:
                 return layout
-        return find_layout(data, self.file.shown)
+        find_part(section, (), self.file.shown)
+        for find in PROGRAMS:
+            with damage_named(self.file.shown, "a text table"):
+                layout = find(lines)
+            if layout is not None:
+                break
+        else:
+            layout = find_layout(data, self.file.shown, self._beside)
+        if begins_anew(data if is_all else self._read()[0], layout):
+            name = next(name for name in EPISODE if name not in layout.names)
+            units = (*layout.units, "") if layout.units else ()
+            layout = replace(layout, names=(*layout.names, name), cells=(*layout.cells, Part()), units=units)
+        return layout

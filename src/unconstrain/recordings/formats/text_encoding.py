@@ -1,16 +1,25 @@
 """Text as it lies on disk: compressed, and in whatever encoding."""
 
+import lzma
 import re
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import PurePosixPath
+from typing import Any
 
 import pyarrow as pa
 
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
 from unconstrain.recordings.files import PROBED, File
-from unconstrain.recordings.formats.base import damage_named
+from unconstrain.recordings.formats.base import damage_named, find_part, note_part
 
 BOM = b"\xef\xbb\xbf"
-CODECS = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
+ZIP = "zip"
+CODECS = {
+    b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd", b"\xfd7zXZ\0": "xz", b"PK\x03\x04": ZIP,
+}  # fmt: skip
 """How files begin that are compressed."""
 
 BZIP_BLOCKS = (b"1AY&SY", b"\x17\x72\x45\x38\x50\x90")
@@ -22,18 +31,39 @@ PIECE = 1 << 24
 CONTROL = re.compile("[\x00-\x08\x0e-\x1a\x1c-\x1f\x7f\ufffe]")
 """Characters that no text holds; the escape character, with which terminals are coloured, is in some."""
 
-LATIN = "it is not UTF-8, so it is read as Latin-1; save it as UTF-8 if letters look wrong"
+PRINTED = re.compile(b"[\x80-\x9f]")
+"""Bytes that are letters and dashes on Windows, and nothing in Latin-1."""
+
+NO_LETTERS = (
+    ".parquet",
+    ".pq",
+    ".mat",
+    ".h5",
+    ".hdf5",
+    ".xlsx",
+    ".npz",
+    ".npy",
+    ".bag",
+    ".mcap",
+    ".db3",
+    ".c3d",
+)
+"""Files of an archive that have to be taken out of it to be read."""
+
+LATIN = "it is not UTF-8, so it is read as {}; save it as UTF-8 if letters look wrong"
 WIDE = "it is read as UTF-16; save it as UTF-8 if letters look wrong"
 
 INSTEAD = "write it as Parquet, which is read in pieces"
 
 
-def read_text(file: File) -> tuple[bytes, tuple[str, ...]]:
+def read_text(file: File, part: str | None = None) -> tuple[bytes, tuple[str, ...]]:
     """Return the whole text as UTF-8, and what was guessed of its encoding.
 
     Parameters
     ----------
     file : File
+    part : str, optional
+        Which file of an archive.
 
     Returns
     -------
@@ -47,15 +77,23 @@ def read_text(file: File) -> tuple[bytes, tuple[str, ...]]:
     """
     check_memory(3.0 * file.info.size, f"reading {file.shown}", INSTEAD)
     codec = _codec(file)
-    return decode(file.read() if codec is None else _decompress(file, codec), file.shown)
+    said: tuple[str, ...] = ()
+    if codec == ZIP:
+        every = members(file)
+        chosen = _member(file, part)
+        said = (note_part(chosen, every),) if len(every) > 1 and part is None else ()
+    text, guesses = decode(file.read() if codec is None else _decompress(file, codec, part), file.shown)
+    return text, (*said, *guesses)
 
 
-def begin_text(file: File) -> tuple[bytes, bool, tuple[str, ...]]:
+def begin_text(file: File, part: str | None = None) -> tuple[bytes, bool, tuple[str, ...]]:
     """Return the first lines of the text as UTF-8, whether they are all of it, and what was guessed.
 
     Parameters
     ----------
     file : File
+    part : str, optional
+        Which file of an archive.
 
     Returns
     -------
@@ -74,7 +112,7 @@ def begin_text(file: File) -> tuple[bytes, bool, tuple[str, ...]]:
         data = file.begin()
         is_all = len(data) == file.info.size
     else:
-        data = _decompress(file, codec, PROBED)
+        data = _decompress(file, codec, part, PROBED)
         is_all = len(data) < PROBED
     if not is_all:
         end = max(data.rfind(b"\n"), data.rfind(b"\r"))
@@ -82,6 +120,22 @@ def begin_text(file: File) -> tuple[bytes, bool, tuple[str, ...]]:
         data = data[: end + 1 + (end + 1) % 2] if _is_wide(data) else data[: end + 1]
     text, guesses = decode(data, file.shown)
     return text, is_all, guesses
+
+
+def members(file: File) -> tuple[str, ...]:
+    """Return the names of the files in an archive, the largest first; none where it is no archive.
+
+    What a computer adds for itself is left out.
+    """
+    if _codec(file) != ZIP:
+        return ()
+    with damage_named(file.shown, "a ZIP archive"), file.open() as opened, zipfile.ZipFile(opened) as archive:
+        return tuple(
+            each.filename
+            for each in sorted(archive.infolist(), key=lambda each: -each.file_size)
+            if each.file_size
+            and not any(part[:1] in ("_", ".") for part in PurePosixPath(each.filename).parts)
+        )
 
 
 def is_text(file: File) -> bool:
@@ -95,7 +149,9 @@ def is_text(file: File) -> bool:
 
 def is_compressed(file: File) -> bool:
     """Whether a file begins as compressed ones do."""
-    return _codec(file) is not None
+    codec = _codec(file)
+    # Workbooks and archives of arrays are ZIP archives too.
+    return codec is not None and (codec != ZIP or file.suffix == ".zip")
 
 
 def decode(data: bytes, shown: str) -> tuple[bytes, tuple[str, ...]]:
@@ -118,6 +174,8 @@ def decode(data: bytes, shown: str) -> tuple[bytes, tuple[str, ...]]:
         It is no text.
     """
     no_text = DataError(f"{shown} is not a text table: save it as UTF-8 text, or correct its suffix")
+    if data[257:262] == b"ustar":
+        raise DataError(f"{shown} is an archive of several files: unpack it, and give the files in it")
     if _is_wide(data):
         marked = data[:2] in (b"\xff\xfe", b"\xfe\xff")
         little = data[1::2][:PROBED].count(0) > data[::2][:PROBED].count(0)
@@ -129,15 +187,18 @@ def decode(data: bytes, shown: str) -> tuple[bytes, tuple[str, ...]]:
         if CONTROL.search(text[:PROBED]) is not None:
             raise no_text
         return encoded, (WIDE,)
-    if b"\0" in data[:PROBED]:
-        raise no_text
+    data = data.rstrip(b"\0")
+    crashed = b"\0" in data
     try:
-        data.decode()
+        text = data.decode()
     except UnicodeDecodeError:
-        text = data.decode("latin-1")
-        if CONTROL.search(text[:PROBED]) is not None:
+        windows = PRINTED.search(data) is not None
+        text = data.decode("cp1252" if windows else "latin-1", errors="replace")
+        if CONTROL.search(text[:PROBED].replace("\0", "")) is not None:
             raise no_text from None
-        return text.encode(), (LATIN,)
+        return text.encode(), (LATIN.format("Windows-1252" if windows else "Latin-1"),)
+    if crashed and CONTROL.search(text[:PROBED].replace("\0", "")) is not None:
+        raise no_text
     return data, ()
 
 
@@ -155,15 +216,11 @@ def _codec(file: File) -> str | None:
     return None if codec == "bz2" and file.magic[4:10] not in BZIP_BLOCKS else codec
 
 
-def _decompress(file: File, codec: str, size: int | None = None) -> bytes:
+def _decompress(file: File, codec: str, part: str | None = None, size: int | None = None) -> bytes:
     """Return all that is compressed, or its first `size` bytes."""
     pieces: list[bytes] = []
     length = 0
-    with (
-        damage_named(file.shown, f"compressed with {codec}"),
-        file.open() as opened,
-        pa.CompressedInputStream(opened, codec) as stream,
-    ):
+    with damage_named(file.shown, f"compressed with {codec}"), _opened(file, codec, part) as stream:
         while size is None or length < size:
             piece = stream.read(PIECE if size is None else size - length)
             if not piece:
@@ -173,3 +230,29 @@ def _decompress(file: File, codec: str, size: int | None = None) -> bytes:
             # A small file may hold far more than the memory does.
             check_memory(3.0 * length, f"reading {file.shown}", INSTEAD)
     return b"".join(pieces)
+
+
+@contextmanager
+def _opened(file: File, codec: str, part: str | None) -> Iterator[Any]:
+    """Open what is compressed for reading."""
+    with file.open() as opened:
+        if codec == ZIP:
+            with zipfile.ZipFile(opened) as archive, archive.open(_member(file, part)) as stream:
+                yield stream
+        elif codec == "xz":
+            with lzma.open(opened) as stream:
+                yield stream
+        else:
+            with pa.CompressedInputStream(opened, codec) as stream:
+                yield stream
+
+
+def _member(file: File, part: str | None) -> str:
+    """Return the file of an archive that is read: the one that the user names, or the largest."""
+    every = members(file)
+    chosen = find_part(part, every, file.shown) or next(iter(every), "")
+    if not chosen:
+        raise DataError(f"{file.shown} is empty: there are no files in it")
+    if chosen.lower().endswith(NO_LETTERS):
+        raise DataError(f"{file.shown} holds {chosen}, which is no text: unpack it, and give that file")
+    return chosen

@@ -3,42 +3,25 @@
 import csv
 from collections.abc import Callable, Sequence
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
 
 from unconstrain.errors import DataError
-from unconstrain.recordings.formats.text_layout import Layout, content, split_line
-from unconstrain.recordings.table import Cells
-
-DECIMAL_COMMA = r"^\s*([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)\s*$"
-COMMAS_TELL = "commas in numbers are read as decimal marks"
-POINTS_TOO = "in numbers such as 1.050,5 points set off thousands and commas are read as decimal marks"
-
-# Each begins with a sign, if any. A number that begins with 0 has nothing to set off.
-THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?\s*$"
-SURE_THOUSANDS = r"^\s*[+-]?[1-9]\d{0,2}((,\d{3}){2,}(\.\d*)?|,\d{3}\.\d*)\s*$"
-BOTH = r"^\s*[+-]?[1-9]\d{0,2}(\.\d{3})+,\d+\s*$"
-PLAIN_SMALL = r"^\s*[+-]?\d{1,3}(\.\d*)?\s*$"
-HUNDREDS = r"^\s*[+-]?[1-9]\d{2}(\.\d*)?\s*$"
-PLAIN = r"^\s*[+-]?\d+(\.\d*)?\s*$"
-
-SLASHES = r"^\s*(\d{4})/(\d{1,2})/(\d{1,2})[ T]+(\d{1,2}:\d{2}:\d{2}(?:\.\d{1,9})?)\s*$"
-POINTS = r"^\s*(\d{1,2})\.(\d{1,2})\.(\d{4})[ T]+(\d{1,2}:\d{2}:\d{2}(?:\.\d{1,9})?)\s*$"
-OF_DAY = r"^\s*(\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)\s*$"
-NO_DAY = "times of day are taken for those of one day"
+from unconstrain.recordings.formats.text_lines import Layout, split_line
+from unconstrain.recordings.formats.text_made import cells_of
+from unconstrain.recordings.formats.text_numbers import plain_text
+from unconstrain.recordings.formats.text_rows import Rows
 
 
 def parse(
-    data: bytes, layout: Layout, wanted: Sequence[int], shown: str, place: Callable[[int], str]
+    rows: Rows, layout: Layout, wanted: Sequence[int], shown: str, place: Callable[[int], str]
 ) -> tuple[list[pa.Array], tuple[str, ...]]:
     """Return columns of a table, and what was guessed of their numbers.
 
     Parameters
     ----------
-    data : bytes
-        The whole text, in UTF-8.
+    rows : Rows
     layout : Layout
     wanted : sequence of int
         Which of the layout's columns.
@@ -50,7 +33,7 @@ def parse(
     Returns
     -------
     columns : list of pyarrow.Array
-        Text; the time of frames is numbers (s).
+        Text; what is made is numbers.
     guesses : tuple of str
 
     Raises
@@ -58,41 +41,40 @@ def parse(
     DataError
         A line has another number of cells, or it cannot be told what commas in numbers mean.
     """
-    made = layout.time
+    if not rows.lines:
+        raise DataError(f"{shown} has a header but no samples")
     cells = [layout.cells[i] for i in wanted]
-    needed = [cell for cell in cells if cell is not None]
-    if made is not None and None in cells:
-        needed += [made.frame] if made.sub is None else [made.frame, made.sub]
-    lines = [line for _, line in content(data, layout)]
+    names = {cell: layout.names[i] for i, cell in enumerate(layout.cells) if isinstance(cell, int)}
+    needed = [i for cell in cells for i in ([cell] if isinstance(cell, int) else cell.needs)]
+    lines = rows.lines
     if layout.delimiter == " ":
         lines = [b" ".join(line.split()) for line in lines]
     if layout.is_padded:
         lines = [_fill(line, layout.width, layout.delimiter.encode()) for line in lines]
-    if not lines:
-        raise DataError(f"{shown} has a header but no samples")
-    read = _read(lines, layout, needed, shown, data)
+    text = b"\n".join(lines)
+    read = _read(text, layout, needed, shown, rows)
+    may_have_commas = layout.delimiter != "," or b'"' in text
     guesses: dict[str, None] = {}
-    columns = []
-    for index, cell in zip(wanted, cells, strict=True):
-        if cell is None:
-            columns.append(_time(layout, read, shown, place))
-            continue
-        column = read[cell]
-        name = layout.names[index]
-        called = f"column {name!r}" if name else f"column {index} (counted from 0)"
-        if layout.delimiter != "," or b'"' in data:
-            column = _without_commas(column, f"{shown}: {called}", called, guesses)
-        columns.append(_iso_times(column, called, guesses))
+    for cell, column in read.items():
+        name = names.get(cell)
+        called = f"column {name!r}" if name else f"column {cell} (counted from 0)"
+        read[cell] = plain_text(
+            column, f"{shown}: {called}", called, guesses, may_have_commas=may_have_commas
+        )
+    columns = [
+        _lists(read[cell], layout.widths.get(index, 0), shown, layout.names[index], place)
+        if isinstance(cell, int)
+        else cell.make(cells_of(cell, read, names, shown, place), len(lines), rows.begins)
+        for index, cell in zip(wanted, cells, strict=True)
+    ]
     return columns, tuple(guesses)
 
 
-def _read(
-    lines: list[bytes], layout: Layout, needed: Sequence[int], shown: str, data: bytes
-) -> dict[int, pa.Array]:
+def _read(text: bytes, layout: Layout, needed: Sequence[int], shown: str, rows: Rows) -> dict[int, pa.Array]:
     unique = [str(i) for i in range(layout.width)]  # names may repeat, positions do not
     try:
         table = pyarrow.csv.read_csv(
-            pa.BufferReader(b"\n".join(lines)),
+            pa.BufferReader(text),
             read_options=pyarrow.csv.ReadOptions(column_names=unique, block_size=1 << 24),
             parse_options=pyarrow.csv.ParseOptions(delimiter=layout.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
@@ -101,8 +83,8 @@ def _read(
             ),
         )
     except pa.ArrowInvalid as error:
-        raise _ragged(data, layout, shown, error) from error
-    return {i: table.column(unique[i]).combine_chunks() for i in needed}
+        raise _ragged(rows, layout, shown, error) from error
+    return {i: table.column(unique[i]).combine_chunks() for i in dict.fromkeys(needed)}
 
 
 def _fill(line: bytes, width: int, delimiter: bytes) -> bytes:
@@ -114,82 +96,32 @@ def _fill(line: bytes, width: int, delimiter: bytes) -> bytes:
     return bare + delimiter * max(width - 1 - bare.count(delimiter), 0)
 
 
-def _time(layout: Layout, read: dict[int, pa.Array], shown: str, place: Callable[[int], str]) -> pa.Array:
-    """Return the time (s) of rows that are numbered, zero at the first frame there could be."""
-    made = layout.time
-    assert made is not None
-    numbers = Cells(read[made.frame], shown, f"column {layout.names[made.frame]!r}", place).numbers() - 1
-    if made.sub is not None:
-        sub = Cells(read[made.sub], shown, f"column {layout.names[made.sub]!r}", place).numbers()
-        numbers = numbers * (np.max(sub) + 1) + sub
-    return pa.array(numbers / made.rate)
-
-
-def _without_commas(column: pa.Array, where: str, called: str, guesses: dict[str, None]) -> pa.Array:
-    """Return text whose numbers have neither decimal commas nor thousands set off."""
-    has_comma = pc.match_substring(column, ",")
-    if not pc.any(has_comma).as_py():
+def _lists(column: pa.Array, width: int, shown: str, name: str, place: Callable[[int], str]) -> pa.Array:
+    """Return cells that hold numbers in brackets as lists of these; other columns, of no width, as they are."""
+    if not width:
         return column
-    with_comma, others = column.filter(has_comma), column.filter(pc.invert(has_comma))
-    if _any(with_comma, BOTH):
-        column = pc.replace_substring_regex(column, r"(\d)\.(\d{3})", r"\1\2")
-        guesses[POINTS_TOO] = None
-        return pc.replace_substring_regex(column, DECIMAL_COMMA, r"\1.\2")
-    numbers = with_comma.filter(pc.or_(_matches(with_comma, DECIMAL_COMMA), _matches(with_comma, THOUSANDS)))
-    if not len(numbers):
-        return column
-    is_decimal = not pc.all(_matches(numbers, THOUSANDS)).as_py()
-    plain = others.filter(_matches(others, PLAIN))
-    # 950 beside 1,050: a decimal that always has three digits would be 950,000.
-    beside = len(plain) > 0 and pc.all(_matches(plain, PLAIN_SMALL)).as_py()
-    is_thousands = _any(numbers, SURE_THOUSANDS) or (not is_decimal and beside and _any(plain, HUNDREDS))
-    if beside and not is_decimal and not is_thousands:
-        raise DataError(
-            f"{where} holds {numbers[0].as_py().strip()!r} beside {plain[0].as_py().strip()!r}, so its comma may be a "
-            "decimal mark or set off thousands; write numbers with points and without anything between thousands"
-        )
-    if is_decimal and is_thousands:
-        odd = numbers.filter(pc.invert(_matches(numbers, THOUSANDS)))[0].as_py().strip()
-        sure = numbers.filter(_matches(numbers, SURE_THOUSANDS))[0].as_py().strip()
-        raise DataError(
-            f"{where} holds {sure!r} and {odd!r}, so its commas mean two things; write numbers with points and "
-            "without anything between thousands"
-        )
-    if is_thousands:
-        guesses[f"commas in numbers of {called} are read as setting off thousands"] = None
-        return pc.if_else(_matches(column, THOUSANDS), pc.replace_substring(column, ",", ""), column)
-    guesses[COMMAS_TELL] = None
-    return pc.replace_substring_regex(column, DECIMAL_COMMA, r"\1.\2")
+    bare = pc.utf8_trim(pc.utf8_trim_whitespace(column), "[]()")
+    parts = pc.split_pattern_regex(pc.utf8_trim(bare, " ,"), r"[,\s]+")
+    try:
+        return parts.cast(pa.list_(pa.float64()))
+    except pa.ArrowInvalid as error:
+        odd = pc.invert(pc.match_substring_regex(bare, r"^[\d\s,.eE+-]*$"))
+        at = f", first at {place(pc.index(odd, True).as_py())}" if pc.any(odd).as_py() else ""
+        raise DataError(f"{shown}: column {name!r} holds lists of something else than numbers{at}") from error
 
 
-def _iso_times(column: pa.Array, called: str, guesses: dict[str, None]) -> pa.Array:
-    """Return stamps as ISO 8601 has them: a date with slashes or points, or only the time of day."""
-    first = column[:1]
-    if _any(first, SLASHES):
-        return pc.replace_substring_regex(column, SLASHES, r"\1-\2-\3 \4")
-    if _any(first, POINTS):
-        return pc.replace_substring_regex(column, POINTS, r"\3-\2-\1 \4")
-    if _any(first, OF_DAY):
-        guesses[f"{called}: {NO_DAY}"] = None
-        return pc.replace_substring_regex(pc.replace_substring(column, ",", "."), OF_DAY, r"1970-01-01 \1")
-    return column
-
-
-def _matches(column: pa.Array, pattern: str) -> pa.Array:
-    return pc.match_substring_regex(column, pattern)
-
-
-def _any(column: pa.Array, pattern: str) -> bool:
-    return bool(pc.any(_matches(column, pattern)).as_py())
-
-
-def _ragged(data: bytes, layout: Layout, shown: str, error: Exception) -> DataError:
-    for number, line in content(data, layout):
+def _ragged(rows: Rows, layout: Layout, shown: str, error: Exception) -> DataError:
+    for number, line in zip(rows.numbers, rows.lines, strict=True):
         try:
             count = len(split_line(line.decode(), layout.delimiter))
         except csv.Error:
             break
         if count != layout.width:
+            if layout.delimiter == "," and count == 2 * layout.width:
+                return DataError(
+                    f"{shown}: line {number} has {count} cells where the first line has {layout.width}, so commas may "
+                    "be decimal marks there as well as separate cells; write it with points, or semicolons in between"
+                )
             return DataError(
                 f"{shown}: line {number} has {count} {'cell' if count == 1 else 'cells'} "
                 f"where the first line has {layout.width}; "

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,16 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import DataError, UnconstrainError
+from unconstrain.recordings.actions import find_kind
 from unconstrain.recordings.columns import DIFFERENTIATE, Columns
-from unconstrain.recordings.formats.base import Format
+from unconstrain.recordings.formats.base import Format, HasParts
 from unconstrain.recordings.formats.lerobot import ACTION, EPISODE, STATE, TIME, LeRobot
 from unconstrain.recordings.inspection.command import fit_command
+from unconstrain.recordings.inspection.kinds import TIME as TIME_WORDS
 from unconstrain.recordings.inspection.kinds import (
     ColumnReport,
+    are_tracks,
     epoch_unit,
     judge,
     sign_flips,
     tells_episodes,
+    with_unit,
+    words,
     wraps,
 )
 from unconstrain.recordings.inspection.looking import Looked, look_at
@@ -32,6 +38,7 @@ from unconstrain.recordings.inspection.proposal import (
     choose_time,
     key_of,
     keys_of,
+    rises_evenly,
 )
 from unconstrain.recordings.inspection.result import Inspection
 from unconstrain.recordings.inspection.timing import Timing, explained_by, judge_stamps
@@ -51,8 +58,21 @@ MOST_TRIED = 12
 TRIED_ROWS = 3_000_000
 """Rows of files that are read to try a proposal; of more, it is proposed without."""
 
+COARSE = 0.34
+"""Where fewer of the stamps differ from the one before, they are coarser than the samples."""
+
+SPARSE = 0.5
+"""Where fewer of the rows hold all columns, these are filled at different rates."""
+
 NANOSECOND_STEP = 1e5
 """Stamps of which nothing tells the unit are nanoseconds if their typical step is as large."""
+
+LIKELY = {
+    "target": "commanded states",
+    "increment": "steps to the next state",
+    "scaled": "commands within -1 and 1 that a controller scales",
+}
+"""What actions are that are no velocities."""
 
 MOVING_TYPES = ("Odometry", "PoseStamped", "JointState", "TransformStamped", "Pose", "Path", "Twist")
 """The kinds of messages that are looked at first, where a file holds several tables."""
@@ -61,13 +81,18 @@ MOST_TOPICS = 30
 """Tables of one file that are looked into."""
 
 
-def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> Inspection:
+def inspect(
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
+) -> Inspection:
     """Look at recordings, and find the command that learns from them.
 
     Parameters
     ----------
     source : path, pattern, URI, or several of them
         Files of any format that `open` reads.
+    part : str, optional
+        Which part of each file, such as a sheet; see `Columns`. By default the one that `open` reads, or else the first
+        that holds a movement.
 
     Returns
     -------
@@ -85,21 +110,29 @@ def inspect(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -
     >>> print(uc.inspect("wipe.csv"))  # doctest: +SKIP
     """
     paths = _paths(source)
-    found = open_formats(paths, Columns())
+    chosen = Columns(part=part)
+    found = open_formats(paths, chosen)
     shown, files, robot = found[0]
     topics = _topics(files[0])
     with np.errstate(over="ignore", invalid="ignore"):  # any numbers may be in a file
         if topics:
             return _inspect_topics(paths, shown, files[0], topics)
-        return _inspect(paths, found, robot, None)
+        inspected = _inspect(paths, found, robot, chosen)
+        if inspected.next is None and part is None and len(found) == 1 and isinstance(files[0], HasParts):
+            return _inspect_parts(paths, files[0], inspected)
+        return inspected
 
 
-def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[str]:
+def list_keys(
+    source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
+) -> list[str]:
     """List the columns that there are, or, of a file that holds several tables, these.
 
     Parameters
     ----------
     source : path, pattern, URI, or several of them
+    part : str, optional
+        Which part of each file.
 
     Returns
     -------
@@ -112,7 +145,7 @@ def list_keys(source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
         There is no such file, or it cannot be read.
     """
     paths = _paths(source)
-    file = open_formats(paths, Columns())[0].formats[0]
+    file = open_formats(paths, Columns(part=part))[0].formats[0]
     topics = _topics(file)
     if topics:
         return [str(topic) for topic in topics]
@@ -157,14 +190,17 @@ def _topics(file: Format) -> list[_Topic]:
 
 def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic]) -> Inspection:
     """Look into each table of a file, and take the first that holds a movement."""
-    listed = [f"topic {topic}" for topic in topics]
+    listed = []
+    if len(topics) > 1:
+        which = ", ".join(map(str, topics[:MOST_TOPICS]))
+        listed = [f"the topics that may hold a movement are {which}; --topic chooses others"]
     best: Inspection | None = None
     for topic in topics[:MOST_TOPICS]:
         if topic.count == 0:
             continue
         name = topic.name
         try:
-            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, name)
+            one = _inspect(paths, [Found(shown, [file.for_topics((name,))])], None, Columns(topic=name))
         except UnconstrainError as error:
             listed.append(f"topic {name} was not looked into: {error}")
             continue
@@ -176,6 +212,21 @@ def _inspect_topics(paths: list[Any], shown: str, file: Any, topics: list[_Topic
     if best is None:
         return Inspection(shown, 0, 0, None, None, (), (*listed, "no topic holds a movement"), None)
     return replace(best, notes=(*listed, *best.notes))
+
+
+def _inspect_parts(paths: list[Any], file: HasParts, first: Inspection) -> Inspection:
+    """Look into the parts of a file, and take the first that holds a movement, or else the part that is read."""
+    for name in file.parts()[:MOST_TOPICS]:
+        chosen = Columns(part=name)
+        try:
+            one = _inspect(paths, open_formats(paths, chosen), None, chosen)
+        except UnconstrainError:
+            continue
+        if one.next is not None:
+            every = ", ".join(map(repr, file.parts()))
+            other = f"part {name!r} holds a movement; --part chooses another one, of {every}"
+            return replace(one, notes=(other, *one.notes))
+    return first
 
 
 @dataclass(frozen=True)
@@ -192,22 +243,38 @@ def _inspect(
     paths: list[Any],
     found: Sequence[Found],
     robot: LeRobot | None,
-    topic: str | None,
+    chosen: Columns,
 ) -> Inspection:
     shown, first, _ = found[0]
     header = first[0].columns()
     names = [column.name for column in header.columns]
     alike = [f for f in found if [column.name for column in f[1][0].columns().columns] == names]
-    files = [file for _, formats, _ in alike for file in formats if file.at_once or any(file.row_groups)]
+    numbered = [
+        (number, file)
+        for number, (_, formats, _) in enumerate(alike)
+        for file in formats
+        if file.at_once or any(file.row_groups)
+    ]
+    files = [file for _, file in numbered]
     if not files:
         raise DataError(f"{shown} has no samples")
-    looked = look_at(files)
+    looked = look_at(files, [number for number, _ in numbered])
     notes = list(looked.notes)
     if len(alike) < len(found):
         others = next(f[0] for f in found if f not in alike)
         notes.append(f"{others} has other columns than {shown}, so that one `fit` cannot read both")
     called = [_called(column.name, column.part_of, column.component, robot) for column in looked.columns]
     reports = judge(called, looked.values, looked.units)
+    reports = [
+        with_unit(report, column.unit, values)
+        for report, column, values in zip(reports, looked.columns, looked.values, strict=True)
+    ]
+    notes += _unread(reports, looked)
+    if are_tracks(looked.names, looked.values):
+        notes.append(
+            "the first two columns are taken for the numbers of frames and of those who are seen in them; --time and "
+            "--episode overrule this, and --rate says how many frames there are a second"
+        )
     reports = [
         replace(report, kind="episode")
         if i in looked.texts and tells_episodes(report.name, looked.texts[i])
@@ -216,10 +283,14 @@ def _inspect(
     ]
     declared = first[0].declared()
     knows = declared is not None and declared.columns.state is not None
-    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values)]
+    given = None if declared is None else declared.columns.episode
+    told = [i for i, column in enumerate(looked.columns) if given is not None and column.name == given]
+    named = told or choose_episodes(reports, looked.values, None)[0]
+    before = _codes(named[0] if named else None, looked)
+    clocks = [_clock(i, reports[i], looked) for i in choose_time(reports, looked.values, before)]
     clock = clocks[0] if clocks else None
     rising = None if clock is None or len(alike) > 1 else clock.seconds
-    episodes, is_guess = choose_episodes(reports, looked.values, rising)
+    episodes, is_guess = (told, False) if told else choose_episodes(reports, looked.values, rising)
     codes = _codes(episodes[0] if episodes else None, looked)
     timing = None if clock is None else judge_stamps(clock.seconds, codes)
     if clock is not None and timing is not None:
@@ -230,15 +301,20 @@ def _inspect(
         notes.append(
             f"episodes are told apart by {name}, which changes where the time starts anew; else give --episode"
         )
+    reports = _without_held(reports, looked, codes)
     notes += _oddities(reports, looked, codes)
-    judged = _Judged(looked, reports, clocks, episodes, codes, topic)
+    judged = _Judged(looked, reports, clocks, episodes, codes, chosen)
     tried = _try(paths, judged, robot, knows, len(alike) == len(found))
     notes += tried.notes
+    timing = _of_the_states(timing, clock, codes, looked, tried.states)
+    counted = None if clock is None else _rate_of_runs(clock, codes)
+    if timing is not None and counted is not None:
+        timing = replace(timing, rate_hz=counted)
     reports = [replace(report, name=name) for report, name in zip(tried.reports, looked.names, strict=True)]
     rows, n_episodes = looked.n_rows, len(np.unique(codes)) if len(codes) else 0
     rate = None if timing is None or timing.rate_hz is None else float(f"{timing.rate_hz:.6g}")
     return Inspection(
-        ", ".join(name for name, _, _ in alike),
+        _several([name for name, _, _ in alike]),
         rows,
         n_episodes,
         rate,
@@ -256,7 +332,8 @@ class _Judged:
     clocks: list[_Clock]
     episodes: list[int]
     codes: Codes
-    topic: str | None
+    chosen: Columns
+    """The topic or the part that is looked into."""
 
 
 @dataclass(frozen=True)
@@ -264,6 +341,7 @@ class _Tried:
     next: str | None
     notes: list[str]
     reports: list[ColumnReport]
+    states: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -286,10 +364,10 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
     """Try proposals one after the other until one can be read."""
     if not alike:
         return _Tried(None, [], judged.reports)
-    if robot is not None:
+    if robot is not None and STATE in robot.features:
         proposals = _for_robot(judged)
     elif knows:
-        proposals = iter([_Proposal(Columns(), Preparation())])
+        proposals = iter([_Proposal(judged.chosen, Preparation())])
     else:
         proposals = _proposals(judged)
     problem = ""
@@ -312,7 +390,8 @@ def _try(paths: list[Any], judged: _Judged, robot: LeRobot | None, knows: bool, 
             replace(report, kind=_kind_in(proposal, i, report.kind))
             for i, report in enumerate(judged.reports)
         ]
-        return _Tried(fit_command(paths, proposal.columns, proposal.preparation), notes, reports)
+        command = fit_command(paths, proposal.columns, proposal.preparation)
+        return _Tried(command, notes, reports, proposal.positions)
     return _Tried(None, [*judged.looked.guesses, _why_none(judged, problem)], judged.reports)
 
 
@@ -339,9 +418,12 @@ def _for_robot(judged: _Judged) -> Iterator[_Proposal]:
         if share > AGREES:
             yield _Proposal(Columns(), Preparation(), velocities=actions, positions=states)
             return
+        codes = _codes(episode, judged.looked)
+        kind = _kind_of_actions(_matrix(values, states), _matrix(values, actions), codes, seconds)
+        likely = LIKELY.get(kind, "commanded states, perhaps")
         text = (
-            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion): it may be the "
-            "commanded state, so the states are differentiated; --action overrules this"
+            f"{ACTION} is not the velocity of {STATE} (it explains {max(share, 0.0):.0%} of the motion), but {likely}, "
+            "so the states are differentiated; --action overrules this"
         )
         yield _Proposal(differentiated, Preparation(), (text,), positions=states)
         return
@@ -353,13 +435,33 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
     looked, reports = judged.looked, judged.reports
     clocks: list[_Clock | None] = [*judged.clocks[:2], None]
     episode = judged.episodes[0] if judged.episodes else None
+    counting = {
+        i
+        for i, report in enumerate(reports)
+        if report.kind in ("number", "position") and rises_evenly(looked.values[i], judged.codes)
+    }
+    untimed = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
+    rate = _rate_of_runs(judged.clocks[0], judged.codes) if judged.clocks else None
+    if rate is not None:
+        clocks = [None]
+        called = _name(looked.names[judged.clocks[0].place], judged.clocks[0].place)
+        untimed = (
+            f"{called} has one stamp for many samples in a row, so these are counted instead, at {rate:g} Hz; --rate "
+            "overrules this"
+        )
     for clock in clocks:
-        taken = {i for i in (clock.place if clock else None, episode) if i is not None}
+        taken = {i for i in (clock.place if clock else None, episode) if i is not None} | counting
+        taken |= {each.place for each in judged.clocks} if rate is not None else set()
         groups = choose_states(reports, looked.columns, looked.values, taken)
         for group in groups:
             notes = _group_notes(group, groups, looked)
             if group.kind == "position" and len(group.places) == 3:
                 notes += _pose_notes(group, looked, reports)
+            clockwork = _several(
+                [_name(looked.names[i], i) for i in sorted(counting - {clock and clock.place})]
+            )
+            if clockwork:
+                notes = (*notes, f"{clockwork}: rises evenly, as a clock does, and is left out of the state")
             refused: list[str] = []
             for actions in choose_actions(group, reports, looked.columns):
                 share, guessed = _agreement(group, actions, clock, judged)
@@ -368,23 +470,35 @@ def _proposals(judged: _Judged) -> Iterator[_Proposal]:
                     yield from _roles(judged, group, actions, clock, (*notes, *note))
                 elif clock is not None:
                     listed = _several([_name(looked.names[i], i) for i in actions.places])
+                    kind = _kind_of_actions(
+                        _matrix(looked.values, group.places),
+                        _matrix(looked.values, actions.places),
+                        judged.codes,
+                        clock.seconds,
+                    )
+                    likely = f", but {LIKELY[kind]}" if kind in LIKELY else ""
                     refused.append(
                         f"{listed}: no derivative of the positions (of whose motion they explain "
-                        f"{max(share, 0.0):.0%}), so the states are differentiated; --action overrules this"
+                        f"{max(share, 0.0):.0%}){likely}, so the states are differentiated; --action overrules this"
                     )
             if clock is not None:
                 yield from _roles(judged, group, None, clock, (*notes, *refused))
             elif not any(clocks):
-                text = "no column tells the time, so samples are taken to be a second apart; --rate overrules this"
-                yield from _roles(judged, group, None, None, (*notes, text))
+                yield from _roles(judged, group, None, None, (*notes, untimed), rate or 1.0)
 
 
 def _roles(
-    judged: _Judged, group: Group, actions: Group | None, clock: _Clock | None, notes: tuple[str, ...]
+    judged: _Judged,
+    group: Group,
+    actions: Group | None,
+    clock: _Clock | None,
+    notes: tuple[str, ...],
+    rate: float = 1.0,
 ) -> Iterator[_Proposal]:
     looked = judged.looked
     at = looked.positions
-    columns = Columns(
+    columns = replace(
+        judged.chosen,
         state=keys_of(group.places, looked.columns, at),
         action=None if actions is None else keys_of(actions.places, looked.columns, at),
         time=None if clock is None else key_of(clock.place, looked.columns, at),
@@ -392,34 +506,79 @@ def _roles(
     )
     if group.kind == "rotation":
         columns = replace(columns, rotation=keys_of(group.places, looked.columns, at))
-    if judged.topic is not None:
-        columns = replace(columns, topic=judged.topic)
     unit = None if clock is None or clock.is_typed or clock.unit == "s" else clock.unit
-    plain = Preparation(time_unit=unit, rate=1.0 if clock is None and actions is None else None)
+    plain = Preparation(time_unit=unit, rate=rate if clock is None and actions is None else None)
     velocities = () if actions is None else actions.places
     yield _Proposal(columns, plain, notes, velocities, group.places)
-    if actions is None and clock is not None:
-        window = _shortest_window(clock, judged.codes)
-        if window is not None:
-            text = (
-                f"the shortest episode is short, so states are smoothed over {window:.3g} s only (--window)"
-            )
-            yield _Proposal(columns, replace(plain, window=window), (*notes, text), (), group.places)
+    resampled = _rate_of_each(group.places, clock, judged)
+    if resampled is not None:
+        text = (
+            f"the states are filled at different times, so each is interpolated between its own stamps, to "
+            f"{resampled:g} Hz; --resample names another rate"
+        )
+        yield _Proposal(columns, replace(plain, resample=resampled), (*notes, text), velocities, group.places)
     # Samples are left out only if the recording cannot be used with them.
     dropping = replace(plain, drop="missing,duplicates,short")
     yield _Proposal(columns, dropping, notes, velocities, group.places)
 
 
-def _shortest_window(clock: _Clock, codes: Codes) -> float | None:
-    """Return the window (s) that fits the shortest episode, where that is shorter than usual and has three samples."""
+def _rate_of_each(places: Sequence[int], clock: _Clock | None, judged: _Judged) -> float | None:
+    """Return the rate (Hz) of the column that is filled most often, where few rows hold all columns."""
+    if clock is None:
+        return None
+    there = np.isfinite(_matrix(judged.looked.values, places))
+    counts = there.sum(axis=0)
+    best = there[:, int(np.argmax(counts))]
+    if there.all(axis=1).sum() > SPARSE * best.sum():
+        return None
+    rate = judge_stamps(clock.seconds[best], judged.codes[best]).rate_hz
+    return None if rate is None else float(f"{rate:.3g}")
+
+
+def _rate_of_runs(clock: _Clock, codes: Codes) -> float | None:
+    """Return the rate (Hz) of samples that share stamps too coarse for them; None where most stamps differ."""
     order = np.argsort(codes, kind="stable")
-    parts = np.split(clock.seconds[order], np.cumsum(np.bincount(codes))[:-1])
-    if not parts or min(map(len, parts)) < 3:
+    seconds, own = clock.seconds[order], codes[order]
+    fresh = np.flatnonzero((np.diff(seconds) != 0) | (np.diff(own) != 0)) + 1
+    if len(fresh) < 2 or len(fresh) > COARSE * len(seconds):
         return None
-    duration, steps = min((float(part[-1] - part[0]), len(part) - 1) for part in parts)
-    if duration >= Preparation.window or duration <= 0:
+    # The first and the last stamp are cut off.
+    lengths, steps = np.diff(fresh), np.diff(seconds[fresh])
+    forward = steps > 0
+    if not forward.any():
         return None
-    return float(f"{max(2.0 * duration / steps, 0.5 * duration):.3g}")
+    return float(f"{np.median(lengths[forward] / steps[forward]):.3g}")
+
+
+def _of_the_states(
+    timing: Timing | None, clock: _Clock | None, codes: Codes, looked: Looked, states: Sequence[int]
+) -> Timing | None:
+    """Return what the stamps say of the rows that hold states, where most rows hold others."""
+    if timing is None or clock is None or not states:
+        return timing
+    there = np.isfinite(_matrix(looked.values, states)).any(axis=1)
+    return timing if there.mean() > SPARSE else judge_stamps(clock.seconds[there], codes[there])
+
+
+def _unread(reports: Sequence[ColumnReport], looked: Looked) -> list[str]:
+    """Say which columns hold text that looks like times or numbers and is neither."""
+    notes = []
+    odd: list[int] = []
+    for i, report in enumerate(reports):
+        first = "".join(looked.texts[i][:1]) if i in looked.texts else ""
+        if TIME_WORDS & set(words(report.name)) and re.search(r"\d[:./-]\d", first):
+            notes.append(
+                f"{_name(report.name, i)} holds text such as {first!r}, of which no time can be made: write it as "
+                "2024-12-31 23:59:59.5, or in seconds"
+            )
+        elif re.search(r"\d[.,]\d", first):
+            odd.append(i)
+    if odd:
+        named = _several([_name(reports[i].name, i) for i in odd])
+        notes.append(
+            f"{named}: text such as {str(looked.texts[odd[0]][0])!r}, which is no number, and left out"
+        )
+    return notes
 
 
 def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judged) -> tuple[float, str]:
@@ -438,6 +597,12 @@ def _agreement(group: Group, actions: Group, clock: _Clock | None, judged: _Judg
     if step <= 0:
         return 0.0, ""
     return explained_by(X, V * step, rows, judged.codes), f", if samples are {step:.3g} s apart"
+
+
+def _kind_of_actions(states: Array, actions: Array, codes: Codes, seconds: Array) -> str:
+    """Return what actions are, as `find_kind` has it, of rows in any order of the episodes."""
+    order = np.argsort(codes, kind="stable")
+    return find_kind(states[order], actions[order], codes[order], seconds[order])
 
 
 def _clock(place: int, report: ColumnReport, looked: Looked) -> _Clock:
@@ -495,6 +660,21 @@ def _time_notes(name: str, clock: _Clock, timing: Timing, reports: Sequence[Colu
     if others:
         notes.append(f"{', '.join(map(repr, others))} may be the time as well; --time overrules the choice")
     return notes
+
+
+def _without_held(reports: list[ColumnReport], looked: Looked, codes: Codes) -> list[ColumnReport]:
+    """Take columns that do not change within episodes for constant: a goal moves only from one to the next."""
+    within = np.diff(codes) == 0
+    if np.all(within) or not np.any(within):
+        return reports
+    return [
+        replace(report, kind="constant", detail="in each episode")
+        if report.kind not in ("time", "episode", "text", "empty", "constant", "index", "quaternion")
+        and (values := looked.values[i]) is not None
+        and not np.any(np.diff(values)[within])
+        else report
+        for i, report in enumerate(reports)
+    ]
 
 
 def _oddities(reports: Sequence[ColumnReport], looked: Looked, codes: Codes) -> list[str]:
@@ -570,11 +750,12 @@ def _codes(place: int | None, looked: Looked) -> Codes:
     """Return the episode of each row, as a number: by file and, if there is one, by a column."""
     if place is None:
         return np.unique(looked.files, return_inverse=True)[1].astype(np.int64)
+    # Their values mean the same in all files of a recording.
     own: Any = looked.values[place]
     if own is None:
         own = looked.texts[place]
     inner = np.unique(own, return_inverse=True)[1]
-    codes = looked.files * (int(inner.max()) + 1) + inner if len(inner) else inner
+    codes = looked.recordings * (int(inner.max()) + 1) + inner if len(inner) else inner
     return np.unique(codes, return_inverse=True)[1].astype(np.int64)
 
 

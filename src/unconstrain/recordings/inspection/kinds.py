@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.recordings.units import UNITS
+
 Array = NDArray[np.float64]
 
 TIME = {
@@ -16,6 +18,7 @@ EPISODE = {
     "episode", "episodes", "run", "trial", "demo", "demonstration", "traj", "trajectory", "sequence", "rep",
     "repetition",
 }  # fmt: skip
+REST = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds", "usec", "usecs"}
 INDEX = {"frame", "frames", "index", "idx", "seq", "sample", "id", "count", "row", "number", "no", "sub"}
 FORCE = {"force", "forces", "wrench", "torque", "torques", "effort", "tau", "fx", "fy", "fz", "ft", "f"}
 VELOCITY = {
@@ -28,8 +31,11 @@ ANGLE = {
     "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "rx", "ry", "rz", "q",
 }  # fmt: skip
 POSITION = {"x", "y", "z", "tx", "ty", "tz", "px", "py", "pz", "pos", "position", "positions", "xyz"}
+EARTH = {"latitude", "longitude", "lat", "lon", "lng"}
 STATE = {"state", "states"}
 ROTATION = {"quat", "quaternion", "orientation", "rotation"}
+ACTIONS = {"action", "actions", "acs", "u", "cmd", "command", "control", "ctrl"}
+NEXT = {"next"}
 NEITHER = {
     "covariance",
     "error",
@@ -43,14 +49,6 @@ NEITHER = {
     "voltage",
 }
 """Words in the names of columns that say what these are, in small letters."""
-
-UNITS = {
-    "m": "m", "mm": "mm", "cm": "cm", "km": "km", "rad": "rad", "rads": "rad", "radians": "rad", "deg": "deg",
-    "degrees": "deg", "degree": "deg", "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms",
-    "milliseconds": "ms", "us": "us", "microseconds": "us", "ns": "ns", "nsec": "ns", "nsecs": "ns",
-    "nanoseconds": "ns", "n": "N", "nm": "Nm",
-}  # fmt: skip
-"""Units as names of columns write them."""
 
 FITTING = {
     "time": ("s", "ms", "us", "ns"),
@@ -79,8 +77,8 @@ class ColumnReport:
     name : str
         The name, or "" where the file has none.
     kind : str
-        "position", "velocity", "acceleration", "angle", "quaternion", "force", "time", "episode", "index", "flag",
-        "text", "constant", "empty", or "number" where nothing more is known.
+        "position", "velocity", "acceleration", "angle", "quaternion", "rotation", "force", "time", "episode", "index",
+        "flag", "text", "constant", "empty", or "number" where nothing more is known.
     unit : str or None
         The unit, where it is known.
     low, high : float or None
@@ -145,12 +143,61 @@ def judge(
         ColumnReport(name, "text") if values is None else _judge_one(name, values, unit)
         for name, values, unit in zip(names, columns, units, strict=True)
     ]
+    for start in poses(names, columns):
+        for i in range(start, start + 12):
+            is_position = (i - start) % 4 == 3
+            found[i] = replace(found[i], kind="position" if is_position else "rotation", unit=None)
+    if are_tracks(names, columns):
+        found[0], found[1] = replace(found[0], kind="time"), replace(found[1], kind="episode")
     for start, order in quaternions(names, columns):
         for i in range(start, start + 4):
             values = columns[i]
             assert values is not None
             found[i] = replace(found[i], kind="quaternion", unit=None, detail=f"order {order}")
+        for i in _after(start + 4, names):
+            # A pose ends with its quaternion; what follows in the same array is a wrench, or anything else.
+            if found[i].kind == "position":
+                found[i] = replace(found[i], kind="number", unit=None)
     return found
+
+
+def _after(start: int, names: Sequence[str]) -> list[int]:
+    """Return the components that follow a quaternion in the array that it is part of."""
+    array = words(names[start - 1])[:-1]
+    after = []
+    for i in range(start, len(names)):
+        own = words(names[i])
+        if not own or not own[-1].isdecimal() or own[:-1] != array:
+            break
+        after.append(i)
+    return after
+
+
+def with_unit(report: ColumnReport, unit: str, values: Array | None) -> ColumnReport:
+    """Return a report of a column whose unit the file tells, which may say of what kind it is.
+
+    Parameters
+    ----------
+    report : ColumnReport
+    unit : str
+        As the file has it; "" where it says nothing.
+    values : ndarray of shape (N,) or None
+
+    Returns
+    -------
+    ColumnReport
+    """
+    if not unit or values is None or report.kind in ("text", "empty", "quaternion", "episode", "flag"):
+        return report
+    kind = next((kind for kind, own in FITTING.items() if unit in own), None)
+    if kind == "time":
+        here = values[np.isfinite(values)]
+        rises = len(here) > 1 and float(np.mean(np.diff(here) > 0)) > 0.8
+        return replace(report, kind="time", unit=unit) if rises or report.kind == "time" else report
+    if EARTH & set(words(report.name)):
+        return replace(report, kind="position", unit=unit)
+    unknown = report.kind in ("number", "position", "angle") and not NEITHER & set(words(report.name))
+    return replace(report, kind=kind if unknown and kind is not None else report.kind, unit=unit)
 
 
 def quaternions(names: Sequence[str], columns: Sequence[Array | None]) -> list[tuple[int, str]]:
@@ -182,6 +229,58 @@ def quaternions(names: Sequence[str], columns: Sequence[Array | None]) -> list[t
         else:
             start += 1
     return found
+
+
+def poses(names: Sequence[str], columns: Sequence[Array | None]) -> list[int]:
+    """Find the rows of pose matrices: twelve neighbouring columns without names of which nine are a rotation.
+
+    Parameters
+    ----------
+    names : sequence of str
+    columns : sequence of ndarray of shape (N,), or None
+
+    Returns
+    -------
+    list of int
+        The first column of each matrix [R p], written row by row, as KITTI does.
+    """
+    found: list[int] = []
+    start = 0
+    while start + 12 <= len(columns):
+        own = [values for values in columns[start : start + 12] if values is not None]
+        if len(own) == 12 and not any(names[start : start + 12]) and len(own[0]):
+            R = np.stack(own, axis=1).reshape(-1, 3, 4)[:, :, :3]
+            if np.allclose(R @ R.transpose(0, 2, 1), np.eye(3), atol=UNIT_NORM):
+                found.append(start)
+                start += 12
+                continue
+        start += 1
+    return found
+
+
+def are_tracks(names: Sequence[str], columns: Sequence[Array | None]) -> bool:
+    """Whether the first two columns, without names, number frames and those that are seen in them.
+
+    Parameters
+    ----------
+    names : sequence of str
+    columns : sequence of ndarray of shape (N,), or None
+
+    Returns
+    -------
+    bool
+        Whether frames rise for each number, and several numbers share frames.
+    """
+    first = [values for values in columns[:2] if values is not None]
+    if any(names) or len(columns) < 4 or len(first) < 2 or len(first[0]) < 4:
+        return False
+    frames, tracks = first
+    if not all(np.isfinite(each).all() and np.all(each == np.round(each)) for each in first):
+        return False
+    order = np.lexsort((frames, tracks))
+    steps, same = np.diff(frames[order]), np.diff(tracks[order]) == 0
+    shared = len(np.unique(frames)) < len(frames)
+    return shared and bool(np.mean(same) > 0.5) and bool(np.all(steps[same] > 0))
 
 
 def sign_flips(quaternion: Array, episodes: NDArray[np.int64]) -> int:
@@ -237,10 +336,13 @@ def tells_episodes(name: str, texts: NDArray[np.str_]) -> bool:
 
 
 def _may_be_one(called: Sequence[Sequence[str]], letters: str) -> bool:
-    """Whether the names of four columns allow that they are a quaternion; `x, y, vx, vy` do not."""
+    """Whether the names of four columns allow that they are a quaternion; `x, y, vx, vy` do not, nor do actions."""
+    if any(ACTIONS & set(own) for own in called):
+        return False
     alike = all(own[:-1] == called[0][:-1] for own in called)
     numbered = alike and all(own[-1].isdecimal() or not own[-1] for own in called)
-    return sorted(letters) == sorted("wxyz") or numbered or all(ROTATION & set(own) for own in called)
+    lettered = alike and sorted(letters) == sorted("wxyz")
+    return lettered or numbered or all(ROTATION & set(own) for own in called)
 
 
 def _is_unit(four: Array) -> bool:
@@ -272,6 +374,8 @@ def _judge_one(name: str, values: Array, unit: str | None) -> ColumnReport:
         return replace(report, kind="constant")
     if TIME & set(called) and forward > 0.8:
         return replace(report, kind="time", unit=unit_of(name, "time"))
+    if whole and REST & set(called):  # what is left of a second
+        return replace(report, kind="index")
     counts = whole and len(steps) > 1 and float(np.mean(steps == 1)) > 0.9
     if counts or (whole and INDEX & set(called)):
         return replace(report, kind="index")

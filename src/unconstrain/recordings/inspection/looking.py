@@ -1,6 +1,6 @@
 """All columns of a file as numbers or text, whatever is in them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,11 @@ Array = NDArray[np.float64]
 
 MOST_ROWS = 200_000
 """Rows looked at of files that are read in pieces."""
+
+MOST_NAMED = 6
+"""Names in a sentence."""
+
+NOTHING: NDArray[np.int64] = np.zeros(0, np.int64)
 
 MOST_CELLS = 20_000_000
 """Numbers looked at: fewer rows where there are many columns."""
@@ -38,6 +43,8 @@ class Looked:
         Of columns that are stamps by their type.
     files : ndarray of shape (N,)
         The file of each row, as a number from 0.
+    recordings : ndarray of shape (N,)
+        The recording of each row: files of a folder are one.
     n_rows : int
         How many rows there are, of which these may be the first.
     notes : tuple of str
@@ -52,6 +59,7 @@ class Looked:
     texts: dict[int, NDArray[np.str_]]
     units: list[str | None]
     files: NDArray[np.int64]
+    recordings: NDArray[np.int64]
     n_rows: int
     notes: tuple[str, ...]
     guesses: tuple[str, ...] = ()
@@ -67,13 +75,15 @@ class Looked:
         return [column.name for column in self.columns]
 
 
-def look_at(files: Sequence[Format]) -> Looked:
+def look_at(files: Sequence[Format], recordings: Sequence[int]) -> Looked:
     """Read the columns of files that mean the same, whatever is in them.
 
     Parameters
     ----------
     files : sequence of Format
         With the columns of the first.
+    recordings : sequence of int
+        The number of the recording that each file is part of.
 
     Returns
     -------
@@ -86,11 +96,10 @@ def look_at(files: Sequence[Format]) -> Looked:
     """
     header = files[0].columns()
     positions, left_out = _equally_long(header)
-    notes = [f"left out {name}, which {why}" for name, why in header.unusable.items()]
-    notes += [f"left out {name}, which is not as long as the others" for name in left_out]
+    notes = _left_out({**header.unusable, **dict.fromkeys(left_out, "is not as long as the others")})
     columns = [header.columns[i] for i in positions]
     if not columns:
-        return Looked(header, (), [], {}, [], np.zeros(0, np.int64), 0, tuple(notes))
+        return Looked(header, (), [], {}, [], NOTHING, NOTHING, 0, tuple(notes))
     keys = list(dict.fromkeys((column.part_of or column.name, column.nth) for column in columns))
     most = min(MOST_ROWS, max(MOST_CELLS // len(columns), 1000))
     n_rows = sum(sum(each.row_groups) for each in files)
@@ -113,7 +122,8 @@ def look_at(files: Sequence[Format]) -> Looked:
     units: list[str | None] = []
     at = {key: i for i, key in enumerate(keys)}
     for place, column in enumerate(columns):
-        numbers, text, unit = _column(column, at, [rows for _, rows in parts], files[0])
+        numbers, text, unit, strays = _column(column, at, [rows for _, rows in parts], files[0])
+        notes += strays
         values.append(numbers)
         units.append(unit)
         if text is not None:
@@ -127,10 +137,24 @@ def look_at(files: Sequence[Format]) -> Looked:
         texts,
         units,
         which,
+        np.asarray(recordings, dtype=np.int64)[which],
         n_rows,
         tuple(notes),
         tuple(dict.fromkeys(guesses)),
     )
+
+
+def _left_out(unusable: Mapping[str, str]) -> list[str]:
+    """Say what is no column, a sentence for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for name, why in unusable.items():
+        reasons.setdefault(why, []).append(name)
+    said = []
+    for why, names in reasons.items():
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        which = f"which {why}" if len(names) == 1 else f"each of which {why}"
+        said.append(f"left out {', '.join(names[:MOST_NAMED])}{more}, {which}")
+    return said
 
 
 def _equally_long(header: Header) -> tuple[list[int], list[str]]:
@@ -144,21 +168,38 @@ def _equally_long(header: Header) -> tuple[list[int], list[str]]:
 
 def _column(
     column: Column, at: dict[ColumnKey, int], batches: Sequence[pa.RecordBatch], file: Format
-) -> tuple[Array | None, NDArray[np.str_] | None, str | None]:
+) -> tuple[Array | None, NDArray[np.str_] | None, str | None, list[str]]:
     place = at[column.part_of or column.name, column.nth]
     numbers: list[Array] = []
     unit = None
+    strays: list[str] = []
     for rows in batches:
         cells = Cells(rows.column(place), file.file.shown, column.name, file.place)
         try:
             if column.component is not None:
                 cells = cells.component(column.component, column.width, "state", column.part_of)
             part, unit = _numbers(cells)
+            strays += _strays(cells, part)
         except DataError:
             text = [str(value) for each in batches for value in each.column(place).to_pylist()]
-            return None, np.array(text, dtype=np.str_), None
+            return None, np.array(text, dtype=np.str_), None, []
         numbers.append(part)
-    return np.concatenate(numbers) if numbers else np.zeros(0), None, unit
+    return np.concatenate(numbers) if numbers else np.zeros(0), None, unit, strays
+
+
+def _strays(cells: Cells, numbers: Array) -> list[str]:
+    """Say where text stands in a column of numbers."""
+    if not is_text(cells.values.type) or np.isfinite(numbers).all():
+        return []
+    places = np.flatnonzero(cells.stray_text().to_numpy(zero_copy_only=False))
+    if not len(places):
+        return []
+    first = int(places[0])
+    more = f" and at {len(places) - 1} more" if len(places) > 1 else ""
+    return [
+        f"{cells.called} holds {cells.values[first].as_py()!r} at {cells.place(first)}{more}, where numbers are needed"
+        ": correct it, or leave such rows out with --drop missing"
+    ]
 
 
 def _numbers(cells: Cells) -> tuple[Array, str | None]:
@@ -175,7 +216,7 @@ def _numbers(cells: Cells) -> tuple[Array, str | None]:
             stamps = _cast(values, pa.timestamp("ns"))
             stamps = _cast(values, pa.timestamp("ns", "UTC")) if stamps is None else stamps
             if stamps is None:
-                raise
+                return cells.numbers_or_nan(beside_text=True), None
             return _floats(stamps), "ns"
     if pa.types.is_boolean(kind) or pa.types.is_decimal(kind):
         return _floats(values), None

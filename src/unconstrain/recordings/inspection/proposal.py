@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from unconstrain.recordings.columns import Key
 from unconstrain.recordings.inspection.kinds import (
+    ACTIONS,
+    NEXT,
     STATE,
     ColumnReport,
     epoch_unit,
@@ -18,10 +20,11 @@ from unconstrain.recordings.table import Column
 
 Array = NDArray[np.float64]
 
+UNEVEN, EVEN = 0.2, 1e-6
+"""Steps that scatter by a smaller share are those of a clock: of plain numbers, and of what is called a position."""
+
 MOST_STATES = 40
 """Columns that are proposed together without names that say so."""
-
-ACTIONS = {"action", "actions", "u", "cmd", "command", "control", "ctrl"}
 
 
 @dataclass(frozen=True)
@@ -43,15 +46,20 @@ class Group:
     called: str
 
 
-def choose_time(reports: Sequence[ColumnReport], values: Sequence[Array | None]) -> list[int]:
+def choose_time(
+    reports: Sequence[ColumnReport], values: Sequence[Array | None], episodes: NDArray[np.int64]
+) -> list[int]:
     """Find the columns that may be the time, best first.
 
-    Names and sizes decide; where neither does, the first column that always increases is a guess.
+    Names and sizes decide; where neither does, the first column that always increases evenly within episodes is a
+    guess.
 
     Parameters
     ----------
     reports : sequence of ColumnReport
     values : sequence of ndarray of shape (N,), or None
+    episodes : ndarray of shape (N,)
+        The episode of each row, as far as a column or the files tell it.
 
     Returns
     -------
@@ -72,16 +80,34 @@ def choose_time(reports: Sequence[ColumnReport], values: Sequence[Array | None])
     if stamps:
         return sorted(stamps, key=rank)
     for i, report in enumerate(reports):
-        own = values[i]
-        if report.kind == "number" and own is not None and not report.missing and len(own) > 2:
-            steps = np.diff(own)
-            if np.all(steps > 0) and float(np.median(np.abs(steps - np.median(steps)))) < 0.2 * np.median(
-                steps
-            ):
-                return [i]
-            if i == 0:
-                continue
+        if report.kind in ("number", "position") and rises_evenly(
+            values[i], episodes, UNEVEN if report.kind == "number" else EVEN
+        ):
+            return [i]
     return []
+
+
+def rises_evenly(values: Array | None, episodes: NDArray[np.int64], scatter: float = EVEN) -> bool:
+    """Whether a column goes up in steps of one size within each episode, as a clock does.
+
+    Parameters
+    ----------
+    values : ndarray of shape (N,), or None
+    episodes : ndarray of shape (N,)
+    scatter : float
+        How much the typical step may differ from the median one, of which it is a share.
+
+    Returns
+    -------
+    bool
+    """
+    if values is None or len(values) < 3 or not np.isfinite(values).all():
+        return False
+    steps = np.diff(values)[np.diff(episodes) == 0]
+    if not len(steps) or not np.all(steps > 0):
+        return False
+    middle = float(np.median(steps))
+    return float(np.median(np.abs(steps - middle))) < scatter * middle
 
 
 def choose_episodes(
@@ -146,7 +172,7 @@ def choose_states(
             called = set(words(report.name))
             is_state = report.kind in ("number", "angle", "position") and bool(STATE & called)
             judged = "state" if is_state else report.kind
-            if judged == kind and i not in taken and not ACTIONS & called:
+            if judged == kind and i not in taken and not (ACTIONS | NEXT) & called:
                 found.setdefault(_stem(columns[i], kind), []).append(i)
         groups += _in_order(kind, _runs(found, columns), reports)
     groups += [Group("rotation", places, "") for places in choose_rotations(reports)]
@@ -155,7 +181,7 @@ def choose_states(
         for i, report in enumerate(reports)
         if report.kind == "number"
         and i not in taken
-        and not ACTIONS & set(words(report.name))
+        and not (ACTIONS | NEXT) & set(words(report.name))
         and (own := values[i]) is not None
         and is_smooth(own)
     ]
@@ -202,6 +228,8 @@ def choose_actions(state: Group, reports: Sequence[ColumnReport], columns: Seque
     found: dict[str, list[int]] = {}
     for i, report in enumerate(reports):
         named = ACTIONS & set(words(report.name))
+        if NEXT & set(words(report.name)):
+            continue
         if i not in state.places and report.missing == 0 and (report.kind == "velocity" or named):
             kind = "action" if named else "velocity"
             found.setdefault(f"{kind} {_stem(columns[i], 'velocity')}", []).append(i)

@@ -11,6 +11,7 @@ from unconstrain.recordings.angles import unwrap
 from unconstrain.recordings.derivative import differentiate
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
+from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.relative import describe, end_of, moving_centre
 from unconstrain.recordings.resampling import make_grid
 from unconstrain.spaces import Pose, Space
@@ -85,7 +86,7 @@ def differentiate_states(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     assert rows.time is not None
     U = np.empty_like(rows.U)
     for own in rows.runs():
-        U[own] = _velocities(portion.recording.recorded_space, rows.X[own], rows.time[own], portion)
+        U[own] = _velocities(portion.recording.recorded_space, rows.X[own], rows.time[own], portion.recording)
     return replace(rows, U=U), ()
 
 
@@ -100,7 +101,7 @@ def accelerate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     U = np.empty_like(rows.U)
     for own in rows.runs():
         assert rows.time is not None
-        U[own] = differentiate(rows.U[own], rows.time[own], window=recording.preparation.window)
+        U[own] = differentiate(rows.U[own], rows.time[own], window=recording.fit_window(rows.time[own]))
     text = (
         "states are positions and velocities, and actions accelerations; order=1 takes velocities for actions"
     )
@@ -108,10 +109,10 @@ def accelerate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     return replace(rows, X=np.hstack([rows.X, rows.U]), U=U, policy=None), (note,)
 
 
-def _velocities(space: Space, X: Array, time: Array, portion: Portion) -> Array:
+def _velocities(space: Space, X: Array, time: Array, recording: Recording) -> Array:
     """Differentiate the states (N, n) of one episode."""
     C = space.coordinates(X)
-    return space.velocity(C, differentiate(C, time, window=portion.recording.preparation.window))
+    return space.velocity(C, differentiate(C, time, window=recording.fit_window(time)))
 
 
 def relate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
@@ -119,24 +120,25 @@ def relate(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     recording = portion.recording
     if not recording.is_relative:
         return rows, ()
-    columns, how = recording.columns, recording.preparation
     X, U = np.empty_like(rows.X), np.empty_like(rows.U)
     for own in rows.runs():
         X[own], U[own] = _relate(portion, rows.take(own))
-    in_frame = not recording.recorded_space.is_flat or (
-        rows.reference is not None and takes_frame(recording.recorded_space, rows.reference.shape[1])
+    space, to = recording.recorded_space, recording.columns.relative_to
+    in_frame = not space.is_flat or (
+        rows.reference is not None and takes_frame(space, rows.reference.shape[1])
     )
     note = Note(
-        "relative", recording.name, describe(columns.relative_to, how.moving_centre, in_frame=in_frame)
+        "relative",
+        recording.name,
+        describe(to, recording.preparation.moving_centre, in_frame=in_frame),
     )
     return replace(rows, X=X, U=U, policy=None), (note,)
 
 
 def _relate(portion: Portion, episode: Rows) -> tuple[Array, Array]:
     """Return the states and actions of one episode relative to what the options say."""
-    columns, how, space = (
-        portion.recording.columns, portion.recording.preparation, portion.recording.recorded_space
-    )  # fmt: skip
+    recording = portion.recording
+    columns, how, space = recording.columns, recording.preparation, recording.recorded_space
     X, U, time, reference = episode.X, episode.U, episode.time, episode.reference
     if reference is not None:
         assert time is not None
@@ -144,7 +146,7 @@ def _relate(portion: Portion, episode: Rows) -> tuple[Array, Array]:
         if not kind.is_flat:
             _check_rotations(portion, episode, kind, reference, "the columns of relative_to=")
         reference = kind.follow(reference)
-        X, U = relate_to(space, X, U, reference, _velocities(kind, reference, time, portion))
+        X, U = relate_to(space, X, U, reference, _velocities(kind, reference, time, recording))
         X = space.follow(X)
     elif columns.relative_to is not None:
         end = np.tile(end_of(X, str(columns.relative_to)), (len(X), 1))

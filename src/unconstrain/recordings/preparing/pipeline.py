@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from unconstrain.recordings.blocks import Loaded
+from unconstrain.recordings.preparing.filling import fill_columns
 from unconstrain.recordings.preparing.labelling import label
 from unconstrain.recordings.preparing.motion import (
     accelerate,
@@ -27,6 +28,7 @@ Rows with which it has nothing to do it returns as they are. It changes no array
 
 STEPS: tuple[Step, ...] = (
     time_rows,
+    fill_columns,
     follow_states,
     split_rows,
     divide_increments,

@@ -34,7 +34,8 @@ def read(portion: Portion) -> tuple[Rows, Notes]:
     recording, pieces, everything = portion.recording, portion.complete, portion.everything
     roles = recording.roles
     about_constraints = everything or recording.makes_projections
-    X = _read(pieces, roles.state, "state")
+    gappy = recording.fills
+    X = _read(pieces, roles.state, "state", gappy)
     none = np.zeros((len(X), recording.recorded_space.n_actions))
     projections = None
     if recording.reads_projections:
@@ -44,23 +45,38 @@ def read(portion: Portion) -> tuple[Rows, Notes]:
     rows = Rows(
         numbers=_numbers(pieces),
         X=X,
-        U=_read(pieces, roles.action, "action") if roles.action else none,
+        U=_read(pieces, roles.action, "action", gappy) if roles.action else none,
         codes=codes,
         episodes=episodes,
         origins=tuple((code, 0) for code in range(len(episodes.values))),
-        forces=_read(pieces, roles.force, "force") if roles.force and about_constraints else None,
+        forces=_read(pieces, roles.force, "force", gappy) if roles.force and about_constraints else None,
         free=read_flags(pieces, roles.free) if roles.free is not None and about_constraints else None,
         policy=_read(pieces, roles.policy, "policy") if roles.policy and everything else None,
         projections=projections,
-        reference=_read(pieces, roles.reference, "relative_to") if roles.reference else None,
+        reference=_read(pieces, roles.reference, "relative_to", gappy) if roles.reference else None,
     )
     missing = sum(len(piece.rows) for piece in portion.pieces) - len(rows)
     if not missing:
         return rows, ()
-    return rows, (Note("empty", recording.name, "left out {} with something missing", (missing,), ("row",)),)
+    notes = (Note("empty", recording.name, "left out {} with something missing", (missing,), ("row",)),)
+    if missing <= len(rows) or not recording.timed:
+        return rows, notes
+    text = (
+        "most rows lack something, as where columns are filled at different rates: resample= interpolates each between "
+        "its own stamps"
+    )
+    return rows, (*notes, Note("empty", recording.name, text))
 
 
-def _read(pieces: Sequence[Piece], fields: Sequence[Field], role: str) -> Array:
+def _read(pieces: Sequence[Piece], fields: Sequence[Field], role: str, gappy: bool = False) -> Array:
+    if gappy:
+        columns = [
+            np.concatenate([piece.cells(field, role).numbers_or_nan(beside_text=True) for piece in pieces])
+            if field.component is None
+            else read_numbers(pieces, (field,), role)[0]
+            for field in fields
+        ]
+        return np.stack(columns, axis=1).astype(np.float64)
     return np.ascontiguousarray(read_numbers(pieces, fields, role).T, dtype=np.float64)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.pieces import Piece
-from unconstrain.recordings.recording import Episodes, Recording
+from unconstrain.recordings.recording import NEEDED, Episodes, Recording
 from unconstrain.recordings.resampling import Grid
 from unconstrain.recordings.steps import runs
 
@@ -116,7 +116,7 @@ class Portion:
     @cached_property
     def complete(self) -> Sequence[Piece]:
         """The pieces, where that is asked for without the rows in which something is missing."""
-        return self.recording.complete(self.pieces)
+        return self.recording.complete(self.pieces, ("time",) if self.recording.fills else NEEDED)
 
 
 Notes = tuple[Note, ...]

@@ -10,7 +10,6 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.derivative import spans_window, window_samples
 from unconstrain.recordings.gaps import GAP_STEPS, SUSPICIOUS, Fragments, split
 from unconstrain.recordings.notes import Note, count
-from unconstrain.recordings.preparation import Preparation
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.resampling import count_even
@@ -42,7 +41,7 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
         lasts = stamps[-1] - stamps[0] >= (how.min_duration or 0.0) * (1 - 1e-9)
         if not lasts or (len(stamps) < 2 and recording.kind.kind == "increment"):
             return False
-        return not recording.smooths or _spans_window(stamps, how)
+        return not recording.smooths or _spans_window(stamps, recording.window, how.resample)
 
     found = split(
         rows.X, rows.time, rows.codes, gap=gap, max_speed=how.max_speed, long_enough=long_enough,
@@ -55,25 +54,27 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 def _check_long_enough(recording: Recording, rows: Rows) -> None:
     assert rows.time is not None
     how = recording.preparation
+    window = how.window or 0.0  # one that was found becomes shorter where it has to
     for label, own in zip(rows.episodes.labels, rows.runs(), strict=True):
         stamps = rows.time[own]
-        if len(stamps) < 2 or (recording.smooths and not _spans_window(stamps, how)):
+        if len(stamps) < 2 or (recording.smooths and not _spans_window(stamps, window, how.resample)):
             samples = count(len(stamps), "sample")
-            resampled, remedy = "", "lower window="
+            over = "" if how.window is None else f" with window={how.window:g} s"
+            remedy = "" if how.window is None else ", or lower window="
             if how.resample is not None:
-                resampled, remedy = f" at resample={how.resample:g} Hz", "raise resample="
+                over, remedy = f"{over} at resample={how.resample:g} Hz", ", or raise resample="
             raise DataError(
                 f"{recording.shown}: episode {label!r} has {samples} over {stamps[-1] - stamps[0]:.3g} s, too few to "
-                f'differentiate with window={how.window:g} s{resampled}; leave it out with drop="short", or {remedy}'
+                f'differentiate{over}; leave it out with drop="short"{remedy}'
             )
 
 
-def _spans_window(stamps: Array, how: Preparation) -> bool:
+def _spans_window(stamps: Array, window: float, resample: float | None) -> bool:
     """Whether a fragment can be differentiated, as it will be after resampling."""
-    if how.resample is None:
-        return spans_window(stamps, how.window)
-    even = count_even(float(stamps[-1] - stamps[0]), how.resample)
-    return even >= window_samples(1.0 / how.resample, how.window)
+    if resample is None:
+        return spans_window(stamps, window)
+    even = count_even(float(stamps[-1] - stamps[0]), resample)
+    return even >= window_samples(1.0 / resample, window)
 
 
 def _describe(found: Fragments, recording: Recording) -> Notes:

@@ -33,6 +33,11 @@ def step_local() -> Ratio:
     return _ratio("step-local", *_local(), 0.15, _compiled)
 
 
+def step_stable() -> Ratio:
+    """50 local models in 7 dimensions, made to end at a goal."""
+    return _ratio("step-stable", *_local(), 0.3, _stable)
+
+
 def step_onnx_linear() -> Ratio:
     """The linear policy in ONNX Runtime."""
     return _ratio("step-onnx-linear", *_linear(), 0.04, _onnx)
@@ -82,6 +87,10 @@ def _compiled(policy, x: np.ndarray) -> Callable[[], object]:
     return lambda: step(x)
 
 
+def _stable(policy, x: np.ndarray) -> Callable[[], object]:
+    return _compiled(policy.stabilized(np.zeros(len(x))), x)
+
+
 def _onnx(policy, x: np.ndarray) -> Callable[[], object]:
     import onnxruntime
 
@@ -104,6 +113,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "step-linear": step_linear,
     "step-rbf": step_rbf,
     "step-local": step_local,
+    "step-stable": step_stable,
     "step-onnx-linear": step_onnx_linear,
     "step-onnx-rbf": step_onnx_rbf,
     "step-onnx-local": step_onnx_local,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.arrays import check_numbers, quote
-from unconstrain.constraints.nullspace import in_metric, projection
+from unconstrain.constraints.nullspace import constrain, projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.memory import check_memory
@@ -178,12 +178,23 @@ def simulate(
     x = _checked_start(start, getattr(policy, "n_features_in_", None))
     space = getattr(policy, "space_", None) or Numbers(x.shape[1])
     scale = getattr(policy, "scale_", None)
+    under = None
+    if getattr(policy, "stability_", None) is not None:
+        # A stabilised policy has to know the constraint, and the step: what changes its actions later undoes them.
+        stable: Any = policy
+        stable = stable.held_for(dt)
+        predict, under = stable.predict, stable.predict_constrained
     # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(samples):
             wanted = _actions(predict, x)
             N = None if project is None else project(k, x, wanted)
-            u = wanted if N is None else _project(N, wanted, scale)
+            if N is None:
+                u = wanted
+            elif under is not None:
+                u = under(x, N)
+            else:
+                u = constrain(N, wanted, scale)
             if k == 0:
                 (S, n), d = x.shape, wanted.shape[1]
                 check_size(S, samples, n, d, constrained=N is not None)
@@ -304,13 +315,6 @@ def _check_velocities(space: Space, x: Array, u: Array) -> None:
             f"velocities of the state, {'one each' if space.is_flat else _count(space.n_actions, 'number')}, can be "
             "rolled out: learn it from such actions"
         )
-
-
-def _project(N: Array, wanted: Array, scale: Array | None) -> Array:
-    """Project the policy's actions (S, d) in the metric that it was learnt in."""
-    if scale is None or np.all(scale == scale[0]):
-        return np.einsum("sij,sj->si", N, wanted)
-    return scale * np.einsum("sij,sj->si", in_metric(N, scale), wanted / scale)
 
 
 def _one_per_start(N: Array, starts: int, d: int) -> Array:

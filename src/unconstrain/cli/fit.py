@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from unconstrain.cli import models, outputs, recordings, reporting
+from unconstrain.cli import models, outputs, recordings, reporting, stabilizing
 from unconstrain.cli.command import command
 from unconstrain.cli.declared import option
 from unconstrain.errors import PolicyError
@@ -30,6 +30,11 @@ WORTH_A_WARNING = 0.1
 @recordings.recorded
 @models.model
 @recordings.folds
+@stabilizing.stable_at(
+    'Make the policy end there: a state, "0.1,0.2", or "end", the mean of where episodes end. Actions are changed as '
+    "little as that takes.",
+    "Model",
+)
 @outputs.out("policy.skops", "Where the policy is saved.")
 @outputs.figure("Draw recorded movement and learnt policy")
 @outputs.overwrite
@@ -55,6 +60,7 @@ def fit(
     recorded: recordings.Recorded,
     model: models.Model,
     folds: str | None,
+    stable_at: list[float] | str | None,
     out: Path,
     figure: Path | None,
     overwrite: bool,
@@ -81,7 +87,12 @@ def fit(
         )
     if checkpoint is not None and cluster is not None:
         raise PolicyError("a cluster makes up for workers it loses: leave out checkpoint= or cluster=")
-    needs_memory = {"--model auto": model.is_chosen, "figure=": figure, "folds=": folds}
+    needs_memory = {
+        "--model auto": model.is_chosen,
+        "figure=": figure,
+        "folds=": folds,
+        "stable_at=": stable_at,
+    }
     named = [option for option, given in needs_memory.items() if given]
     is_stream = checkpoint is not None or cluster is not None
     if is_stream and named:
@@ -115,12 +126,17 @@ def fit(
     policy = comparison.policy
     policy.recording_ = recorded.kept(opened)
     policy.state_names_ = list(demos.state_names)
+    if stable_at is not None:
+        with working("making it end at the goal"):
+            policy = stabilizing.stabilize(policy, stable_at, recorded.columns, demos)
     policy.save(out, resumable=resumable)
     if figure is not None:
         from unconstrain import plot
 
         plot.save(plot.policy_figure(policy, demos), figure)
     _describe(comparison, demos)
+    if stable_at is not None:
+        stabilizing.describe(policy)
     if figure is not None:
         reporting.say(f"figure: {figure}")
     to = recorded.columns.relative_to

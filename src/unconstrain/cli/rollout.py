@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from unconstrain.cli import outputs, reporting
+from unconstrain.cli import outputs, reporting, stabilizing
 from unconstrain.cli.command import command
 from unconstrain.cli.declared import Number, Numbers
 from unconstrain.errors import DataError
@@ -52,6 +52,10 @@ if TYPE_CHECKING:
     help="Where the goal is, for a policy learnt with --relative-to goal; for one that is relative to columns, what "
     "those would hold.",
 )
+@stabilizing.stable_at(
+    'Make the policy end there: a state, "0.1,0.2"; "end" for a policy learnt with --relative-to goal. Actions are '
+    "changed as little as that takes. A policy fitted with --stable-at ends at its own goal without this."
+)
 @click.option(
     "--stop-when-unsure",
     type=Number(),
@@ -67,6 +71,7 @@ def rollout(
     dt: float,
     block: tuple[list[float], ...],
     goal: list[float] | None,
+    stable_at: list[float] | str | None,
     stop_when_unsure: float | None,
     out: Path,
     figure: Path,
@@ -91,6 +96,8 @@ def rollout(
     for row in block:
         _check_length(row, "block=", learnt.n_actions_, "actions")
     frame = _find_frame(learnt, start, goal)
+    if stable_at is not None:
+        learnt = _stabilize(learnt, stable_at, frame)
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
     begin, rows = np.array([start]), np.array(block).reshape(-1, learnt.n_actions_)
     if frame is not None:
@@ -104,6 +111,7 @@ def rollout(
             "larger share to stop_when_unsure="
         )
     last = movement.states[-1]  # as the policy has it
+    arrival = None if learnt.stability_ is None else stabilizing.describe_arrival(learnt, movement)
     if frame is not None:
         movement = _out_of(frame, movement)
     write_csv(movement, out)
@@ -111,9 +119,23 @@ def rollout(
     end = zip(movement.state_names, movement.states[-1], movement.states.std(axis=0), strict=True)
     reached = ", ".join(f"{name} {reporting.shown_number(value, scale)}" for name, value, scale in end)
     reporting.say(f"after {taken * dt:g} s: {reached}")
+    if arrival is not None:
+        reporting.say(arrival)
     if unsure is not None and taken < steps:
         reporting.say(f"stopped after {taken} of {steps} steps: {_unsure_at(unsure, last)}")
     reporting.say(f"movement: {out}\nfigure: {figure}")
+
+
+def _stabilize(learnt: "Policy", goal: list[float] | str, frame: "Frame | None") -> "Policy":
+    """Make the policy end at a goal that is given as starts are."""
+    import numpy as np
+
+    if not isinstance(goal, str) and frame is not None and len(goal) == learnt.space_.n_states:
+        goal = frame.into(np.array([goal]))[0].tolist()
+    recording = getattr(learnt, "recording_", None)
+    stable = stabilizing.stabilize(learnt, goal, None if recording is None else recording[0])
+    stabilizing.describe(stable)
+    return stable
 
 
 def _find_frame(learnt: "Policy", start: list[float], goal: list[float] | None) -> "Frame | None":

@@ -84,6 +84,30 @@ def in_metric(N: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.
     return result
 
 
+def constrain(
+    N: NDArray[np.float64], U: NDArray[np.float64], scale: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """Take of actions what projections leave, in the metric of a scale.
+
+    Parameters
+    ----------
+    N : ndarray of shape (N, d, d)
+        Known.
+    U : ndarray of shape (N, d)
+        Actions.
+    scale : ndarray of shape (d,) or None
+        What a length of one is along each action.
+
+    Returns
+    -------
+    ndarray of shape (N, d)
+        The nearest actions that the constraints let through.
+    """
+    if scale is None or np.all(scale == scale[0]):
+        return np.einsum("nij,nj->ni", N, U)
+    return scale * np.einsum("nij,nj->ni", in_metric(N, scale), U / scale)
+
+
 def combine(*A: ArrayLike) -> NDArray[np.float64]:
     """Combine constraint matrices into one that asks for all of them, by stacking their rows.
 

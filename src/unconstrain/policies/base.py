@@ -4,6 +4,7 @@ import warnings
 from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
+from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
@@ -21,6 +22,7 @@ from unconstrain.arrays import (
     check_weights,
 )
 from unconstrain.atomic import as_path
+from unconstrain.constraints.nullspace import constrain
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
@@ -39,6 +41,7 @@ from unconstrain.spaces import Numbers, Space
 
 if TYPE_CHECKING:
     from unconstrain.deploy.compiled import CompiledPolicy
+    from unconstrain.stability import Stability
 
 
 class Policy(RegressorMixin, BaseEstimator):
@@ -55,6 +58,8 @@ class Policy(RegressorMixin, BaseEstimator):
     accumulator_ : Accumulator
         The sums they were solved from. A policy loaded from a file has them only where it was saved with
         `resumable=True`.
+    stability_ : Stability or None
+        What makes the policy end at a goal, in one that `stabilized` returned.
     """
 
     risk: str
@@ -67,6 +72,7 @@ class Policy(RegressorMixin, BaseEstimator):
     accumulator_: Accumulator
     actions_are_scalars_: bool
     n_features_in_: int
+    stability_: "Stability | None" = None
 
     @abstractmethod
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
@@ -130,7 +136,7 @@ class Policy(RegressorMixin, BaseEstimator):
         PolicyError
             An option is impossible.
         """
-        fresh = copy(self)
+        fresh = self._without_stability()
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
         given = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
         accumulator = fresh.start(samples, *given)
@@ -286,7 +292,7 @@ class Policy(RegressorMixin, BaseEstimator):
         DataError
             There is nothing to learn from; the policy then stays as it was.
         """
-        fresh = copy(self)
+        fresh = self._without_stability()
         fresh.n_features_in_ = accumulator.model.n_states
         return self._adopt_from(fresh, accumulator, scalar_actions)
 
@@ -309,7 +315,7 @@ class Policy(RegressorMixin, BaseEstimator):
         U : ndarray of shape (N, d)
             Or (N,), where the policy was fitted to actions of that shape.
         spread : ndarray of shape (N, d) or (N, d, d)
-            Where asked for; see `fitting.posterior`.
+            Where asked for; see `fitting.posterior`. Of a stabilised policy, that of the policy it was made of.
 
         Raises
         ------
@@ -326,6 +332,8 @@ class Policy(RegressorMixin, BaseEstimator):
         X = check_states(self, X)
         scaled = self.model_.evaluate(X, self.solution_.w)
         actions = self._in_own_units(scaled)
+        if self.stability_ is not None:
+            actions = self.stability_.stabilize(X, actions)
         if not (return_std or return_cov):
             return actions[:, 0] if self.actions_are_scalars_ else actions
         covariance = self._in_own_units(self.model_.covariance(X, scaled, self.posterior()))
@@ -333,6 +341,100 @@ class Policy(RegressorMixin, BaseEstimator):
         if self.actions_are_scalars_:
             return actions[:, 0], spread.reshape(len(X))
         return actions, spread
+
+    def predict_constrained(self, X: ArrayLike, projections: np.ndarray) -> np.ndarray:
+        """Predict actions under constraints: what these leave of the policy's own, in the metric that it was learnt in.
+
+        A stabilised policy makes its Lyapunov function fall within what is left; where nothing that is left can do so
+        the action is zero.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+        projections : ndarray of shape (N, d, d)
+            Onto the motion that the constraints leave.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            Actions.
+
+        Raises
+        ------
+        DataError
+            The states are not finite or not of the dimension learnt.
+        """
+        check_is_fitted(self)
+        X = check_states(self, X)
+        own = self._in_own_units(self.model_.evaluate(X, self.solution_.w))
+        if self.stability_ is not None:
+            return self.stability_.stabilize(X, own, projections)
+        return constrain(projections, own, self.model_.scale)
+
+    def stabilized(
+        self,
+        goal: ArrayLike,
+        demos: Demonstrations | ArrayLike | None = None,
+        *,
+        hold: float | None = None,
+    ) -> Self:
+        """Return a policy that ends at a goal, and changes this one's actions as little as that takes.
+
+        A Lyapunov function V, with the goal as its only critical point, is fitted to what this policy does in the
+        recorded region. The other policy's actions are this one's wherever they make V fall already, and elsewhere the
+        nearest that do; see `unconstrain.stability`.
+
+        Parameters
+        ----------
+        goal : array_like of shape (n,), or "end"
+            Where movements end; "end" for the mean of where the episodes of `demos` end. For a policy learnt relative
+            to its goal it is the origin of the states.
+        demos : Demonstrations, or array_like of shape (N, n), optional
+            What was learnt from, or other states of the region in which movements begin. Without it V is fitted to
+            what the policy does at its centres, where it has these.
+        hold : float, optional
+            The longest time for which an action is held, in seconds: by default the usual time between the samples of
+            `demos`, or 0.02. V falls over every such step, for which actions are slowed down where they turn too fast
+            for it. `rollout` with a longer `dt` holds them for that.
+
+        Returns
+        -------
+        Policy
+            A copy. Learning on (`partial_fit`) keeps goal and V; `fit` forgets them.
+
+        Raises
+        ------
+        DataError
+            The goal is no state, or "end" without demonstrations.
+        PolicyError
+            Actions are not velocities of the states, or nothing says where the policy was learnt.
+        """
+        from unconstrain.policies.stabilizing import learn_stability
+
+        check_is_fitted(self)
+        stable = copy(self)
+        stable.stability_ = learn_stability(self._without_stability(), goal, demos, hold)
+        return stable
+
+    def held_for(self, seconds: float) -> Self:
+        """Return this policy for actions that are held for a time, where that is longer than it was made stable for.
+
+        Parameters
+        ----------
+        seconds : float
+            Above zero.
+
+        Returns
+        -------
+        Policy
+            This one where it is not stabilised, or for as long already.
+        """
+        if self.stability_ is None or seconds <= self.stability_.hold:
+            return self
+        slower = copy(self)
+        slower.stability_ = replace(self.stability_, hold=float(seconds))
+        return slower
 
     def posterior(self) -> Posterior:
         """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
@@ -583,6 +685,10 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         step = self.model_.compile(self.solution_.w)
+        if self.stability_ is not None:
+            from unconstrain.deploy.compiled import Stabilized
+
+            step = Stabilized(step, self.stability_)
         step.check_agreement(self.predict)
         return step
 
@@ -755,6 +861,12 @@ class Policy(RegressorMixin, BaseEstimator):
 
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
+
+    def _without_stability(self) -> Self:
+        fresh = copy(self)
+        if fresh.stability_ is not None:
+            fresh.stability_ = None
+        return fresh
 
     def _in_own_units(self, scaled: np.ndarray) -> np.ndarray:
         """Return actions (N, d), or covariances (N, d, d), in the unit of each action."""

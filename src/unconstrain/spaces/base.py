@@ -43,6 +43,11 @@ class Space(ABC):
         return False
 
     @property
+    def blocks(self) -> tuple[tuple[int, bool], ...]:
+        """How the d numbers of a velocity fall into parts: how many each has, and whether it is of plain numbers."""
+        return ((self.n_actions, self.is_flat),)
+
+    @property
     @abstractmethod
     def words(self) -> str:
         """What states are, for a note."""

@@ -66,6 +66,11 @@ class Product(Space):
         return tuple(unit for part in self.parts for unit in part.units)
 
     @property
+    def blocks(self) -> tuple[tuple[int, bool], ...]:
+        """Those of each part; see `Space.blocks`."""
+        return tuple(block for part in self.parts for block in part.blocks)
+
+    @property
     def is_flat(self) -> bool:
         """Whether all parts are."""
         return all(part.is_flat for part in self.parts)

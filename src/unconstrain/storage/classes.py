@@ -43,6 +43,8 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.spaces.product": ("Pose", "Product"),
     "unconstrain.spaces.rotation": ("Rotation",),
     "unconstrain.spaces.second_order": ("SecondOrder",),
+    "unconstrain.stability.lyapunov": ("Lyapunov",),
+    "unconstrain.stability.stabilizing": ("Stability",),
     "sklearn.compose": ("ColumnTransformer",),
     "sklearn.decomposition": ("PCA", "TruncatedSVD"),
     "sklearn.kernel_approximation": ("Nystroem", "RBFSampler"),

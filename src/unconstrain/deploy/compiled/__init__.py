@@ -11,7 +11,8 @@ A compiled policy is of one of five kinds, named by what it evaluates. b are nor
 | potential | -∇ wᵀb(x)                         | centers (M, n), width, weights (M,)                                 |
 | additive  | Σ_j f_j(x_j), f_j of polynomials  | breaks (n, K), origins (n, K+1), polynomials (n, K+1, degree+1, d)  |
 
-`InSpace` is one of these behind what a space makes of the state, and before a scale.
+`InSpace` is one of these behind what a space makes of the state, and before a scale. `Stabilized` is any of them, and
+the smallest change of its actions that leads to a goal.
 
 On one state the cost is that of entering NumPy. So arrays are laid out for each step to be one call, intermediate
 results go to buffers that each thread has for itself, and the largest activation is taken out of the others only far
@@ -24,6 +25,7 @@ from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, Radia
 from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
 from unconstrain.deploy.compiled.loading import load_compiled
+from unconstrain.deploy.compiled.stabilized import Stabilized
 
 __all__ = [
     "Additive",
@@ -33,5 +35,6 @@ __all__ = [
     "LocallyLinear",
     "Potential",
     "RadialBasis",
+    "Stabilized",
     "load_compiled",
 ]

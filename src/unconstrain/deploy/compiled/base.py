@@ -121,7 +121,11 @@ class CompiledPolicy(ABC):
         UnconstrainError
             The place cannot be written to.
         """
-        write(path, Kind.COMPILED_POLICY, {"kind": self.kind}, self.arrays)
+        write(path, Kind.COMPILED_POLICY, *self.contents())
+
+    def contents(self) -> tuple[dict[str, Any], dict[str, ndarray]]:
+        """Return what a file holds: a tree that says what the policy is, and arrays by name."""
+        return {"kind": self.kind}, self.arrays
 
     def check_agreement(self, predict: Callable[[ndarray], ndarray]) -> None:
         """Compare with the policy this was made of, at random states near those learnt from, singly and as a batch.

@@ -1,6 +1,5 @@
 """Compiled policies over states that are no plain numbers, or with a scale of their actions."""
 
-from os import PathLike
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import ArrayLike
 from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.errors import PolicyError
 from unconstrain.spaces import Space, from_description
-from unconstrain.storage import Kind, write
 
 
 class InSpace(CompiledPolicy):
@@ -93,12 +91,15 @@ class InSpace(CompiledPolicy):
             raise self._bad_out(out) from error
         return out
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the arrays to a file; see `CompiledPolicy.save`."""
-        arrays = {**self.step.arrays, "space_scale": self.scale}
-        if self.base is not None:
-            arrays["space_base"] = self.base
-        write(path, Kind.COMPILED_POLICY, {"kind": self.step.kind, "space": self.space.describe()}, arrays)
+    def contents(self) -> tuple[dict[str, Any], dict[str, ndarray]]:
+        """Return what a file holds; see `CompiledPolicy.contents`."""
+        tree, arrays = self.step.contents()
+        own = (
+            {"space_scale": self.scale}
+            if self.base is None
+            else {"space_scale": self.scale, "space_base": self.base}
+        )
+        return {**tree, "space": self.space.describe()}, {**arrays, **own}
 
     def magnitude(self, X: ndarray) -> float:
         """Return the largest term that is added up; see `CompiledPolicy`."""

@@ -7,6 +7,7 @@ from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, RadialBasis
 from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
+from unconstrain.deploy.compiled.stabilized import STABLE_ARRAYS, Stabilized
 from unconstrain.errors import UnconstrainError
 from unconstrain.storage import Kind, damaged, read
 
@@ -37,10 +38,12 @@ def load_compiled(path: str | PathLike[str]) -> CompiledPolicy:
     """
     tree, arrays = read(path, Kind.COMPILED_POLICY)
     try:
-        about = tree.get("space")
-        own = {name: array for name, array in arrays.items() if about is None or name not in SPACE_ARRAYS}
-        step = KINDS[tree["kind"]](**own)
-        return step if about is None else InSpace.restore(step, about, arrays)
+        about, stable = tree.get("space"), tree.get("stable")
+        others = (SPACE_ARRAYS if about is not None else ()) + (STABLE_ARRAYS if stable is not None else ())
+        step = KINDS[tree["kind"]](**{name: array for name, array in arrays.items() if name not in others})
+        if about is not None:
+            step = InSpace.restore(step, about, arrays)
+        return step if stable is None else Stabilized.restore(step, stable, arrays)
     except (UnconstrainError, ValueError, TypeError, KeyError, AttributeError) as error:
         reason = str(error) if isinstance(error, UnconstrainError) else "its arrays are not those of a policy"
         raise damaged(path, Kind.COMPILED_POLICY, reason) from None

@@ -151,7 +151,7 @@ def test_turns_a_second_and_the_part_left_open_are_as_told(printed):
     assert abs(thinnest @ surface[0]) > 0.999
 
     across = np.linalg.svd(flat.actions, full_matrices=False)[2][2]
-    assert np.sum((flat.actions @ across) ** 2) / np.sum(flat.actions**2) == pytest.approx(0.06, abs=0.005)
+    assert np.sum((flat.actions @ across) ** 2) / np.sum(flat.actions**2) == pytest.approx(0.05, abs=0.005)
     shares = []
     for name in ("flat-circle-inconsistency", "flat-circle"):
         P = uc.load_policy(place / f"{name}.skops").predict(curved.states)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.fuzz.engine import AREAS
 
-NUMBER = 100
+NUMBER = 60
 """Of inputs in each area."""
 
 

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import json
-import re
 import shlex
 from pathlib import Path
 
@@ -284,10 +283,10 @@ REAL = (
     else sorted(
         path
         for path in DATA.rglob("*")
-        # Of six episodes that are alike one is enough.
+        # The files of the data set are read as one below.
         if path.is_file()
         and path.suffix not in (".md", ".json", ".jsonl")
-        and not re.search(r"episode_00000[1-5]", path.name)
+        and "lerobot" not in path.parts
     )
 )
 

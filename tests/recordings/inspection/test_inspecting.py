@@ -284,9 +284,7 @@ REAL = (
         path
         for path in DATA.rglob("*")
         # The files of the data set are read as one below.
-        if path.is_file()
-        and path.suffix not in (".md", ".json", ".jsonl")
-        and "lerobot" not in path.parts
+        if path.is_file() and path.suffix not in (".md", ".json", ".jsonl") and "lerobot" not in path.parts
     )
 )
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.fuzz.engine import AREAS
 
-NUMBER = 60
+NUMBER = 40
 """Of inputs in each area."""
 
 

@@ -45,7 +45,7 @@ def first_order(space):
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.words)
 @given(seed=seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_a_difference_leads_from_one_state_to_the_other(space, seed):
     rng = np.random.default_rng(seed)
     X, Y = states(space, rng), states(space, rng)
@@ -58,7 +58,7 @@ def test_a_difference_leads_from_one_state_to_the_other(space, seed):
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.words)
 @given(seed=seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_what_is_relative_can_be_undone(space, seed):
     rng = np.random.default_rng(seed)
     X, to = states(space, rng), states(space, rng)

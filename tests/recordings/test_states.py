@@ -156,8 +156,10 @@ def test_streams_learn_what_memory_does(reaches, options, tmp_path):
     demos = opened.load()
     streamed = uc.fit_stream(uc.ParametricPolicy(alpha=1e-3), opened, batch_rows=100)
     loaded = uc.ParametricPolicy(alpha=1e-3).fit(demos)
+    # A stream finds the base of rotations among the rows as they lie in the file.
+    atol = 1e-4 if "resample" in options else 1e-6
     assert streamed.space_ == demos.space
-    assert np.allclose(streamed.predict(demos.states), loaded.predict(demos.states), atol=1e-4)
+    assert np.allclose(streamed.predict(demos.states), loaded.predict(demos.states), atol=atol)
     demos.save(tmp_path / "saved.npz")
     again = uc.load(tmp_path / "saved.npz")
     assert again.space == demos.space

@@ -164,8 +164,6 @@ def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) ->
 
 
 def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
-    import numpy as np
-
     from unconstrain.diagnostics import identifiability
     from unconstrain.policies.inferred import describe_inferred
 
@@ -197,13 +195,6 @@ def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
         reporting.say(
             f"warning: the policy learnt by {rival} is better by this measure than the one that is saved; "
             f"`--risk {better}` saves it instead"
-        )
-    if not np.all(policy.scale_ == 1.0):
-        each = ", ".join(
-            f"{name} {value:.3g}" for name, value in zip(demos.action_names, policy.scale_, strict=True)
-        )
-        reporting.say(
-            f"scale of the actions, in which errors and noise are measured: {each}; --scale says otherwise"
         )
     report = identifiability(policy, demos.states, demos.actions, projections=demos.projections)
     if 1.0 - report.determined_share >= WORTH_A_WARNING:

@@ -91,19 +91,18 @@ def rollout(
     from unconstrain.simulation import rollout as integrate
 
     learnt = load_policy(policy)
-    space = learnt.space_
-    start = _with_rest(start, "start=", space)
+    begin = _completed(start, "start=", learnt.space_)
     for row in block:
         _check_length(row, "block=", learnt.n_actions_, "actions")
-    frame = _find_frame(learnt, start, goal)
+    frame = _find_frame(learnt, begin, goal)
     if stable_at is not None:
         learnt = _stabilize(learnt, stable_at, frame)
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
-    begin, rows = np.array([start]), np.array(block).reshape(-1, learnt.n_actions_)
+    rows = np.array(block).reshape(-1, learnt.n_actions_)
     if frame is not None:
-        begin, rows = frame.into(begin), frame.constraint_into(rows) if len(rows) else rows
+        begin, rows = frame.into(begin[None])[0], frame.constraint_into(rows)
     with working("rolling out"):
-        movement = integrate(learnt, begin[0], steps, dt, rows if len(rows) else None, stop_when=unsure)
+        movement = integrate(learnt, begin, steps, dt, rows if len(rows) else None, stop_when=unsure)
     taken = len(movement) - 1
     if unsure is not None and taken == 0:
         raise DataError(
@@ -138,7 +137,7 @@ def _stabilize(learnt: "Policy", goal: list[float] | str, frame: "Frame | None")
     return stable
 
 
-def _find_frame(learnt: "Policy", start: list[float], goal: list[float] | None) -> "Frame | None":
+def _find_frame(learnt: "Policy", start: "np.ndarray", goal: list[float] | None) -> "Frame | None":
     """Return what the states of the policy are relative to; None where they are not."""
     from unconstrain.spaces.frames import Frame, takes_frame
 
@@ -149,10 +148,11 @@ def _find_frame(learnt: "Policy", start: list[float], goal: list[float] | None) 
     if goal is not None:
         if to is None or to == START:
             raise DataError("goal= is for a policy learnt relative to a goal or to columns; leave it out")
-        at = goal if takes_frame(space, len(goal)) else _with_rest(goal, "goal=", space)
-        return Frame(space, tuple(at))
+        return Frame(
+            space, tuple(goal if takes_frame(space, len(goal)) else _completed(goal, "goal=", space))
+        )
     if to == START:
-        return Frame(space, tuple(_at_rest(start, space)))
+        return Frame(space, tuple(space.at_rest(start)))
     if to is not None:
         raise DataError(
             "the policy was learnt relative to a goal or to columns: say where that is with goal=, one number a state"
@@ -174,26 +174,16 @@ def _out_of(frame: "Frame", movement: "Demonstrations") -> "Demonstrations":
     )
 
 
-def _with_rest(numbers: list[float], option: str, space: "Space") -> list[float]:
+def _completed(numbers: list[float], option: str, space: "Space") -> "np.ndarray":
     """Check the numbers of a state; one without the velocity that belongs to it is at rest."""
-    from unconstrain.spaces import SecondOrder
-
-    if isinstance(space, SecondOrder) and len(numbers) == space.of.n_states:
-        return [*numbers, *[0.0] * space.n_actions]
-    _check_length(numbers, option, space.n_states, "states")
     import numpy as np
 
-    if space.faults(np.array([numbers])).any():
+    if len(numbers) != space.n_places:
+        _check_length(numbers, option, space.n_states, "states")
+    state = np.array(numbers) if len(numbers) == space.n_states else space.at_rest(np.array(numbers))
+    if space.faults(state[None]).any():
         raise DataError(f"{option} is none of these: {space.words}")
-    return numbers
-
-
-def _at_rest(start: list[float], space: "Space") -> list[float]:
-    from unconstrain.spaces import SecondOrder
-
-    return (
-        [*start[: space.of.n_states], *[0.0] * space.n_actions] if isinstance(space, SecondOrder) else start
-    )
+    return state
 
 
 def _check_length(numbers: list[float], option: str, wanted: int, of: str) -> None:

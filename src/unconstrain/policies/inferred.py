@@ -18,7 +18,7 @@ DOUBTFUL = 0.1
 
 
 def describe_inferred(policy: Policy) -> str:
-    """Say which samples were free, how noisy actions are, and how likely other assumptions are.
+    """Say in which scale actions are, which samples were free, and how large the noise and how likely all that is.
 
     Parameters
     ----------
@@ -28,15 +28,24 @@ def describe_inferred(policy: Policy) -> str:
     Returns
     -------
     str
-        A few lines; for the corrected risk the noise, and none for those that find out nothing.
+        A few lines: the scale of the actions, where there is one, and what was found out. For the corrected risk that
+        is the noise, for those that find out nothing none.
     """
+    scaled = policy.model_.scale is not None
+    unit = "units of the scale" if scaled else "the unit of the action"
+    lines = []
+    if scaled:
+        each = ", ".join(f"{value:.3g}" for value in policy.scale_)
+        lines.append(
+            f"scale of the actions, in which errors and noise are measured: {each}; --scale says otherwise"
+        )
     if policy.risk == "corrected":
-        return f"noise: {policy.noise_:.3g} in the unit of the action"
+        return "\n".join([*lines, f"noise: {policy.noise_:.3g} in {unit}"])
     if policy.solution_.belief is None:
-        return ""
-    lines = [
+        return "\n".join(lines)
+    lines += [
         f"inferred: {policy.free_share_:.1%} of the samples were free",
-        f"noise: {policy.noise_:.3g} in the unit of the action",
+        f"noise: {policy.noise_:.3g} in {unit}",
     ]
     if policy.speed_noise_ > 0:
         lines.append(f"noise of the speed: {policy.speed_noise_:.1%}")

@@ -24,6 +24,9 @@ from unconstrain.recordings.states import FirstRows, arrange_reference, find_fra
 from unconstrain.spaces import Numbers, Space
 from unconstrain.spaces.frames import takes_frame
 
+WORLD = "angular velocities are in the world's frame, in rad/s; angular_velocity=body takes the body's"
+"""What is said where angular velocities are made of how the states turn."""
+
 
 def decide_kind(recordings: Sequence[Recording], given: str | None) -> tuple[Recording, ...]:
     """Decide what recorded actions are: by the first recording where it is not given.
@@ -95,7 +98,7 @@ def decide_space(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...]
         if roles.reference:
             order = arrange_reference(space, roles.reference_names)
             roles = replace(roles, reference=tuple(roles.reference[i] for i in order))
-        every.append(replace(each, roles=roles, place=space))
+        every.append(replace(each, roles=roles, known_space=space))
     return tuple(every), notes
 
 
@@ -114,6 +117,8 @@ def _find_space(recording: Recording) -> tuple[Space, tuple[Note, ...]]:
             raise
         return plain, ()  # what is wrong is told where it is read
     space, notes = find_space(rows, roles, how, recording.shown)
+    if roles.rotations and not roles.action and how.angular_velocity is None:
+        notes = (*notes, Note("frame", "", WORLD))
     if roles.rotations and roles.action and how.angular_velocity is None:
         frame, found = find_frame(rows, space)
         space, notes = in_frame(space, frame), (*notes, *found)

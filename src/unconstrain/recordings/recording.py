@@ -81,8 +81,8 @@ class Recording:
         What recorded actions are.
     leader : Recording, optional
         The recording whose unit of time is taken where it has to be guessed.
-    place : Space, optional
-        What the states in the files are; by default numbers.
+    known_space : Space, optional
+        What the states in the files are, where they are no plain numbers.
     smoothing : Smoothing, optional
         Where something is differentiated, what was found of the states' noise.
     """
@@ -100,13 +100,13 @@ class Recording:
     is_along_episodes: bool = False
     kind: ActionKind = VELOCITY
     leader: "Recording | None" = None
-    place: Space | None = None
+    known_space: Space | None = None
     smoothing: Smoothing | None = None
 
     @property
     def recorded_space(self) -> Space:
         """What the states in the files are."""
-        return self.place or Numbers(len(self.roles.state))
+        return self.known_space or Numbers(len(self.roles.state))
 
     @property
     def space(self) -> Space:

@@ -254,6 +254,26 @@ class Space(ABC):
             Velocities.
         """
 
+    @property
+    def n_places(self) -> int:
+        """How many of the n numbers say where a state is; the others are its velocity."""
+        return self.n_states
+
+    def at_rest(self, x: Array) -> Array:
+        """Return the state (n,) that is where x is, and does not move.
+
+        Parameters
+        ----------
+        x : ndarray of shape (n,) or (n_places,)
+            A state, or where it is.
+
+        Returns
+        -------
+        ndarray of shape (n,)
+            A state.
+        """
+        return np.append(x[: self.n_places], np.zeros(self.n_states - self.n_places))
+
     def offsets(self, X: Array) -> Array:
         """Compute how far states lie from a typical one, as velocities that lead there in a unit of time.
 

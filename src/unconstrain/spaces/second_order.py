@@ -40,6 +40,11 @@ class SecondOrder(Space):
         return np.append(self.of.origin, np.zeros(self.n_actions))
 
     @property
+    def n_places(self) -> int:
+        """Those of x."""
+        return self.of.n_states
+
+    @property
     def units(self) -> tuple[str, ...]:
         """Those of the state's velocity."""
         return self.of.units

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     )
     from unconstrain.demonstrations import Demonstrations
     from unconstrain.diagnostics import identifiability
+    from unconstrain.evaluation import Evaluation, evaluate
     from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
     from unconstrain.fitting import moments
     from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
@@ -39,6 +40,7 @@ __all__ = [
     "ConstraintChain",
     "DecoupledFeatures",
     "Demonstrations",
+    "Evaluation",
     "FeatureConstraint",
     "Inspection",
     "LocallyLinearPolicy",
@@ -51,6 +53,7 @@ __all__ = [
     "constraints",
     "distributed",
     "errors",
+    "evaluate",
     "features",
     "fit_stream",
     "identifiability",
@@ -78,6 +81,7 @@ _HOMES = {
     ),
     "unconstrain.demonstrations": ("Demonstrations",),
     "unconstrain.diagnostics": ("identifiability",),
+    "unconstrain.evaluation": ("Evaluation", "evaluate"),
     "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
     "unconstrain.policies": ("LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"),
     "unconstrain.recordings": (

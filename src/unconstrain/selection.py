@@ -153,12 +153,18 @@ class Selection:
         The comparison.
     policies : dict
         All candidates that could be fitted, fitted to all the data, by name.
+    predictions : dict of ndarray of shape (N, d)
+        Their predictions of held-out actions, by name.
+    judge : Judge
+        By which they were judged.
     """
 
     policy: Policy
     name: str
     table: Table
     policies: dict[str, Policy] = field(repr=False)
+    predictions: dict[str, np.ndarray] = field(repr=False, default_factory=dict)
+    judge: Judge | None = field(repr=False, default=None)
 
     def __str__(self) -> str:
         return f"{self.table}\n\nchosen: {self.name}"
@@ -303,7 +309,14 @@ def select_policy(
     ]
     rows.sort(key=lambda row: (row.problem is not None, row.error))
     policies = {name: found.policy for name, found in held_out.items()}
-    return Selection(policies[rows[0].name], rows[0].name, Table(tuple(rows), judge.measure), policies)
+    return Selection(
+        policies[rows[0].name],
+        rows[0].name,
+        Table(tuple(rows), judge.measure),
+        policies,
+        {name: found.predictions for name, found in held_out.items()},
+        judge,
+    )
 
 
 def _told(named: dict[str, Policy], space: Space | None, noise: float | None) -> dict[str, Policy]:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from unconstrain.cli import models, outputs, recordings, reporting
+from unconstrain.cli import comparing, constraining, models, outputs, recordings, reporting
 from unconstrain.cli.command import command
 from unconstrain.cli.declared import Number
 from unconstrain.errors import PolicyError
@@ -18,6 +18,7 @@ THRESHOLD = 1e-3  # of `diagnostics.spectrum`, which is not imported before it i
     epilog="For example:\n\n\b\nunconstrain diagnose wipe.csv --state x,y,z --time t --episode run",
 )
 @recordings.recorded
+@constraining.constraint
 @models.model
 @recordings.folds
 @outputs.figure("Draw how far the policy is determined")
@@ -41,6 +42,7 @@ THRESHOLD = 1e-3  # of `diagnostics.spectrum`, which is not imported before it i
 )
 def diagnose(
     recorded: recordings.Recorded,
+    constraint: Path | None,
     model: models.Model,
     folds: str | None,
     figure: Path | None,
@@ -53,24 +55,20 @@ def diagnose(
     if model.is_chosen:
         raise PolicyError("this command is about one model: choose --model linear, rbf or locally-linear")
     from unconstrain.diagnostics import identifiability
-    from unconstrain.policies.inferred import describe_inferred
 
     with working("reading"):
-        demos = recorded.load()
+        demos = constraining.tell(recorded.load(), constraint)
     recordings.describe(demos)
-    with working("fitting") as report:
-        policy = model.build()
-        policy.fit(demos, groups=demos.folds(folds))
-        report("diagnosing")
-        found = identifiability(policy, demos, threshold=threshold)
+    comparison, evaluation = comparing.compare(demos, model, folds, recorded.options_used)
+    with working("diagnosing"):
+        found = identifiability(comparison.policy, demos, threshold=threshold)
         text = found.describe(demos.state_names, demos.action_names, most)
     if figure is not None:
         from unconstrain import plot
 
         plot.save(plot.identifiability_figure(found, demos.state_names), figure)
-    inferred = describe_inferred(policy)
-    if inferred:
-        reporting.say(f"{inferred}\n")
+    comparing.describe(comparison, evaluation)
+    reporting.say()
     reporting.say(text)
     if found.n_silent:
         reporting.say(f"{found.n_silent} samples do not move, and say nothing")

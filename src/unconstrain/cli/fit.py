@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from unconstrain.cli import models, outputs, recordings, reporting, stabilizing
+from unconstrain.cli import comparing, constraining, models, outputs, recordings, reporting, stabilizing
 from unconstrain.cli.command import command
 from unconstrain.cli.declared import option
 from unconstrain.errors import PolicyError
@@ -13,14 +13,9 @@ from unconstrain.progress import working
 from unconstrain.recordings.columns import START
 
 if TYPE_CHECKING:
-    from unconstrain.comparison import Comparison
     from unconstrain.demonstrations import Demonstrations
     from unconstrain.policies.base import Policy
     from unconstrain.recordings import Recordings
-    from unconstrain.selection import Row
-
-WORTH_A_WARNING = 0.1
-"""Share of the policy that recordings leave undetermined."""
 
 
 @command(
@@ -28,6 +23,7 @@ WORTH_A_WARNING = 0.1
     epilog="For example:\n\n\b\nunconstrain fit wipe.csv --state x,y,z --time t --episode run --out wipe.skops",
 )
 @recordings.recorded
+@constraining.constraint
 @models.model
 @recordings.folds
 @stabilizing.stable_at(
@@ -58,6 +54,7 @@ WORTH_A_WARNING = 0.1
 )
 def fit(
     recorded: recordings.Recorded,
+    constraint: Path | None,
     model: models.Model,
     folds: str | None,
     stable_at: list[float] | str | None,
@@ -75,15 +72,15 @@ def fit(
     --checkpoint or a --cluster, is read as a stream: without a comparison with ordinary regression.
     """
     outputs.check_outputs(
-        recorded.files,
+        (*recorded.files, *(() if constraint is None else (constraint,))),
         {"out": out, "figure": figure},
         overwrite=overwrite,
         continued={"checkpoint": checkpoint},
     )
-    if model.risk == "direct" and recorded.tells_constraints:
+    if model.risk == "direct" and (recorded.tells_constraints or constraint is not None):
         raise PolicyError(
-            "ordinary regression makes no use of constraints: leave out --risk direct, or else force=, free= and "
-            "projections="
+            "ordinary regression makes no use of constraints: leave out --risk direct, or else force=, free=, "
+            "projections= and constraint="
         )
     if checkpoint is not None and cluster is not None:
         raise PolicyError("a cluster makes up for workers it loses: leave out checkpoint= or cluster=")
@@ -91,6 +88,7 @@ def fit(
         "--model auto": model.is_chosen,
         "figure=": figure,
         "folds=": folds,
+        "constraint=": constraint,
         "stable_at=": stable_at,
     }
     named = [option for option, given in needs_memory.items() if given]
@@ -121,8 +119,9 @@ def fit(
         )
         _suggest(out)
         return
+    demos = constraining.tell(demos, constraint)
     recordings.describe(demos)
-    comparison = _compare(demos, model, folds)
+    comparison, evaluation = comparing.compare(demos, model, folds, recorded.options_used, "saved")
     policy = comparison.policy
     policy.recording_ = recorded.kept(opened)
     policy.state_names_ = list(demos.state_names)
@@ -134,74 +133,16 @@ def fit(
         from unconstrain import plot
 
         plot.save(plot.policy_figure(policy, demos), figure)
-    _describe(comparison, demos)
+    comparing.describe(comparison, evaluation)
     if stable_at is not None:
         stabilizing.describe(policy)
     if figure is not None:
         reporting.say(f"figure: {figure}")
     to = recorded.columns.relative_to
-    _suggest(out, demos, needs_goal=to is not None and to != START)
-
-
-def _compare(demos: "Demonstrations", model: models.Model, folds: str | None) -> "Comparison":
-    from unconstrain.comparison import compare_risks
-    from unconstrain.constraints.recorded import describe_known
-
-    if demos.projections is not None:
-        reporting.say(f"constraints: {describe_known(demos.projections)}")
-    with working("fitting") as report:
-
-        def progress(row: "Row") -> None:
-            report(f"fitted {row.name} in {row.seconds:.1f} s")
-
-        policy = None if model.is_chosen else model.build()
-        return compare_risks(
-            policy,
-            demos,
-            groups=demos.folds(folds),
-            progress=progress,
-        )
-
-
-def _describe(comparison: "Comparison", demos: "Demonstrations") -> None:
-    from unconstrain.diagnostics import identifiability
-    from unconstrain.policies.inferred import describe_inferred
-
-    policy = comparison.policy
-    if comparison.chosen is not None:
-        reporting.say(str(comparison.chosen))
-    left_out = ", left out by the inconsistency" if policy.risk == "inconsistency" else ""
-    reporting.say(f"zero actions: {policy.n_zero_actions_} without a direction{left_out}")
-    chosen = " (chosen by cross-validation)" if policy.alpha == "cv" else ""
-    reporting.say(f"λ: {policy.alpha_:.3g}{chosen}")
-    inferred = describe_inferred(policy)
-    if inferred:
-        reporting.say(inferred)
-    reporting.say_table(
-        ("learnt by", comparison.measure, "share of what is shown explained"),
-        [
-            (
-                f"{risk} (saved)" if row is comparison.kept else risk,
-                f"{row.error:.4g}",
-                f"{row.explained:.2%}",
-            )
-            for risk, row in comparison.rows.items()
-            if row.problem is None
-        ],
-    )
-    better = comparison.better
-    if better is not None:
-        rival = "ordinary regression" if better == "direct" else f"the risk {better}"
-        reporting.say(
-            f"warning: the policy learnt by {rival} is better by this measure than the one that is saved; "
-            f"`--risk {better}` saves it instead"
-        )
-    report = identifiability(policy, demos.states, demos.actions, projections=demos.projections)
-    if 1.0 - report.determined_share >= WORTH_A_WARNING:
-        reporting.say(
-            f"warning: {1.0 - report.determined_share:.0%} of the policy is not determined by these recordings; "
-            "`unconstrain diagnose` says where, and what to record next"
-        )
+    if evaluation.verdict.is_safe:
+        _suggest(out, demos, needs_goal=to is not None and to != START)
+    else:
+        reporting.say(f"policy: {out}")
 
 
 def _suggest(out: Path, demos: "Demonstrations | None" = None, *, needs_goal: bool = False) -> None:

@@ -50,6 +50,17 @@ class Recorded:
         columns = self.columns
         return any(told is not None for told in (columns.force, columns.free, columns.projections))
 
+    @property
+    def options_used(self) -> frozenset[str]:
+        """The options that make other states of those in the files."""
+        columns, how = self.columns, self.preparation
+        used = {
+            "relative_to": columns.relative_to is not None,
+            "moving_centre": how.moving_centre is not None,
+            "order": how.order == 2,
+        }
+        return frozenset(name for name, is_used in used.items() if is_used)
+
     def open(self) -> "Recordings":
         """Open all of it; projections are those that the columns tell of, not those that only simulation knows."""
         from unconstrain.recordings import open as open_recordings

@@ -10,6 +10,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TextIO
 
+WIDTH = 120
+"""Of tables that do not go to a terminal, at most, in letters."""
+
 
 @contextmanager
 def forgiving_output() -> Iterator["ForgivingOutput"]:
@@ -112,7 +115,10 @@ def say_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str 
     table = Table(*columns, title=title)
     for row in rows:
         table.add_row(*map(visible, row))
-    Console(markup=False, highlight=False).print(table)
+    width = (
+        None if sys.stdout.isatty() else WIDTH
+    )  # a file or a pipe has none, and cutting words short helps nobody
+    Console(markup=False, highlight=False, width=width).print(table)
 
 
 def say_error(text: str, hint: str | None = None) -> None:

@@ -97,11 +97,14 @@ class Record:
     repeated : float
         Mean product of held-out residuals that follow each other, ε², in squared units of the action; see
         `fitting.calibration`.
+    regression : Solution, optional
+        Ordinary regression by the same model to the same samples, where inference began with it.
     """
 
     log_likelihoods: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
     repeated: float = 0.0
+    regression: Solution | None = None
 
 
 class Accumulator:

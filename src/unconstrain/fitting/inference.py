@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.fitting.accumulator import Accumulator, Record
+from unconstrain.fitting.accumulator import Accumulator, Record, Solution
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally
 from unconstrain.fitting.drift import Drift
@@ -63,6 +63,10 @@ FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN, SPEED = (
     "inferred, with noise in speed",
 )
 INFERRED = (FROM_DIRECT, FROM_INCONSISTENCY, AGAIN)
+
+FIRST = {"regression": "whole", "ordinary regression": "direct", "inconsistency": "inconsistency"}
+"""Risks of the first passes. Ordinary regression is what the policy is held against later; the first pass is it already
+where no projection is known."""
 
 WARMTH = 10.0**2
 """By what the variance found is multiplied for the run that starts where the likelier of two ended. In many dimensions
@@ -229,6 +233,7 @@ class Inference:
     starts: dict[str, Belief] = field(default_factory=dict)
     history: list[dict[str, Any]] = field(default_factory=list)
     scale: float = 1.0
+    regression: Solution | None = None
     result: Accumulator | None = None
 
     def next_pass(self) -> Accumulator | None:
@@ -241,9 +246,8 @@ class Inference:
         """
         if self.result is not None:
             return None
-        if self.stage in ("regression", "inconsistency"):
-            risk = "whole" if self.stage == "regression" else "inconsistency"
-            return self._blank(risk)
+        if self.stage in FIRST:
+            return self._blank(FIRST[self.stage])
         if self.stage == "run":
             run = self.runs[-1]
             wanted = self._blank("adaptive", run.belief)
@@ -269,6 +273,9 @@ class Inference:
         self.blank.longest = max(self.blank.longest, done.total.longest)
         if self.stage == "regression":
             self._start(done, FREE)
+            self.stage = "inconsistency" if self.regression is not None else "ordinary regression"
+        elif self.stage == "ordinary regression":
+            self._keep_regression(done.solve())
             self.stage = "inconsistency"
         elif self.stage == "inconsistency":
             self._start(done, CONSTRAINED)
@@ -280,7 +287,7 @@ class Inference:
             self._compare(done)
         else:
             repeated = self.repeated[self.compared[0].name]
-            done.record = Record(self.likelihoods, tuple(self.history), repeated)
+            done.record = Record(self.likelihoods, tuple(self.history), repeated, self.regression)
             self.result = done
             return
         if done.folds is not None:
@@ -311,9 +318,9 @@ class Inference:
         """What the next pass is for, in a few words."""
         if self.stage == "run":
             return f"{self.runs[-1].name}, pass {self.runs[-1].passes + 1}"
-        return {"regression": "regression", "inconsistency": "inconsistency", "final": "last pass"}.get(
-            self.stage, "held-out likelihood"
-        )
+        if self.stage in FIRST:
+            return self.stage
+        return "last pass" if self.stage == "final" else "held-out likelihood"
 
     @property
     def _floor(self) -> float:
@@ -334,9 +341,16 @@ class Inference:
             self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
             check_scale(self.scale, "adaptive")
             variance = _residual(done, solution.w) / d
+            if (
+                not solution.n_known
+            ):  # where projections are known, this is regression of what they let through
+                self._keep_regression(solution)
         else:
             variance = 0.25 * self.scale / d
         self.starts[name] = Belief(solution.w, Noise(max(variance, self._floor)))
+
+    def _keep_regression(self, solution: Solution) -> None:
+        self.regression = Solution(solution.w, solution.alpha, n_samples=solution.n_samples)
 
     def _run(self, name: str, start: Belief, **options: Any) -> None:
         held = options.pop("held", None)

@@ -193,6 +193,7 @@ class Policy(RegressorMixin, BaseEstimator):
         fresh = copy(self)
         samples, _ = check_input(fresh, X, y, groups, sample_weight, projections, first=False)
         accumulator.longest = max(accumulator.longest, accumulator.total.longest)
+        accumulator.record = replace(accumulator.record, regression=None)  # to which nothing was added
         accumulator.add(samples)
         if accumulator.total.misjudged:
             raise DataError(
@@ -738,6 +739,25 @@ class Policy(RegressorMixin, BaseEstimator):
         left = copy(self)
         left.solution_ = accumulator.solve(self.alpha, without)
         return left
+
+    def ordinary_regression(self) -> Self | None:
+        """Return ordinary regression by the same model to the same samples, to be held against this policy.
+
+        Returns
+        -------
+        Policy or None
+            That predicts, but cannot learn on. None where it is not known: with other risks than "adaptive" and
+            "direct", where projections were known, and after `partial_fit`, unless `compare_risks` has made it.
+        """
+        check_is_fitted(self)
+        solution = self.solution_ if self.risk == "direct" else self.solution_.record.regression
+        if solution is None:
+            return None
+        other = self._without_stability()
+        other.risk, other.solution_ = "direct", solution
+        if hasattr(other, "accumulator_"):
+            del other.accumulator_
+        return other
 
     def scaled(self, U: np.ndarray) -> np.ndarray:
         """Divide actions by the scale, so that their lengths and angles are those that the policy was learnt by.

@@ -17,6 +17,43 @@ DOUBTFUL = 0.1
 """Gain in log-likelihood of a sample, whatever it is worth, by which contact would explain more than none."""
 
 
+def finds_no_contact(policy: Policy) -> bool:
+    """Whether all samples that the policy has learnt from were taken for free, having been looked at.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+
+    Returns
+    -------
+    bool
+        False for other risks than "adaptive".
+    """
+    return policy.solution_.belief is not None and next(iter(policy.log_likelihoods_), None) == FREE
+
+
+def is_in_doubt(policy: Policy) -> bool:
+    """Whether contact would explain more than none, though it could not be told from what the model misses.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+
+    Returns
+    -------
+    bool
+        False for other risks than "adaptive".
+    """
+    if not finds_no_contact(policy):
+        return False
+    likelihoods = policy.log_likelihoods_
+    # Constraints on every sample explain anything, so their likelihood is no ground for doubt.
+    rivals = [value for name, value in likelihoods.items() if name not in (CONSTRAINED, SPEED)]
+    return max(rivals) - likelihoods[FREE] > DOUBTFUL
+
+
 def describe_inferred(policy: Policy) -> str:
     """Say in which scale actions are, which samples were free, and how large the noise and how likely all that is.
 
@@ -58,9 +95,6 @@ def describe_inferred(policy: Policy) -> str:
             f"log-likelihood of a {held_out}sample: {policy.log_likelihood_:.4g} as inferred, {', '.join(others)}"
         )
         if chosen == FREE:
-            # Constraints on every sample explain anything, so their likelihood is no ground for doubt.
-            rivals = [value for name, value in likelihoods.items() if name not in (CONSTRAINED, SPEED)]
-            is_in_doubt = max(rivals) - likelihoods[FREE] > DOUBTFUL
             found = NOTHING_MORE_FOUND if policy.n_known_constraints_ else NOTHING_FOUND
-            lines.append(IN_DOUBT if is_in_doubt else found)
+            lines.append(IN_DOUBT if is_in_doubt(policy) else found)
     return "\n".join(lines)

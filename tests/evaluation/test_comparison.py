@@ -1,7 +1,7 @@
 import pytest
 
 import unconstrain as uc
-from unconstrain.comparison import compare_risks
+from unconstrain.evaluation import compare_risks
 from unconstrain.demo import draw_recordings, make_policy
 from unconstrain.limit_cycle import demonstrate
 

@@ -1,0 +1,86 @@
+"""A model fitted with every risk, and what held-out episodes say of each: what `fit` and `diagnose` share."""
+
+from typing import TYPE_CHECKING
+
+from unconstrain.cli import models, reporting
+from unconstrain.cli.command import in_words_of_program
+from unconstrain.cli.declared import is_given
+from unconstrain.progress import working
+
+if TYPE_CHECKING:
+    from unconstrain.demonstrations import Demonstrations
+    from unconstrain.evaluation import Comparison, Evaluation
+    from unconstrain.selection import Row
+
+
+def compare(
+    demos: "Demonstrations",
+    model: models.Model,
+    folds: str | None,
+    used: frozenset[str],
+    label: str = "taken",
+) -> tuple["Comparison", "Evaluation"]:
+    """Fit all risks, keep the better unless the command line asks for one, and evaluate it.
+
+    Parameters
+    ----------
+    demos : Demonstrations
+    model : Model
+    folds : "episodes", "blocks", or None
+        What is held out.
+    used : frozenset of str
+        Options that made the states what they are; see `Recorded.options_used`.
+    label : str
+        What becomes of the policy, for its line of the table.
+
+    Returns
+    -------
+    Comparison, Evaluation
+        The policy that is kept is the comparison's own.
+    """
+    from unconstrain.constraints.recorded import describe_known
+    from unconstrain.evaluation import compare_risks, evaluate_held_out
+
+    if demos.projections is not None:
+        reporting.say(f"constraints: {describe_known(demos.projections)}")
+    with working("fitting") as report:
+
+        def progress(row: "Row") -> None:
+            report(f"fitted {row.name} in {row.seconds:.1f} s")
+
+        policy = None if model.is_chosen else model.build()
+        compared = compare_risks(policy, demos, groups=demos.folds(folds), progress=progress)
+        if compared.better is not None and not is_given("risk"):
+            compared = compared.taking(compared.better)
+        return compared, evaluate_held_out(compared, demos, label=label, without=used, progress=report)
+
+
+def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
+    """Say what was inferred, how all risks predict what was held out, and what that comes to."""
+    from unconstrain.evaluation.evaluation import COLUMNS
+    from unconstrain.policies.inferred import describe_inferred
+
+    policy, better = comparison.policy, comparison.better
+    if comparison.chosen is not None:
+        reporting.say(str(comparison.chosen))
+    left_out = ", left out by the inconsistency" if policy.risk == "inconsistency" else ""
+    reporting.say(f"zero actions: {policy.n_zero_actions_} without a direction{left_out}")
+    chosen = " (chosen by cross-validation)" if policy.alpha == "cv" else ""
+    reporting.say(f"λ: {policy.alpha_:.3g}{chosen}")
+    inferred = describe_inferred(policy)
+    if inferred:
+        reporting.say(inferred)
+    reporting.say_table(("held out", *COLUMNS[1:]), evaluation.rows())
+    if better is not None:
+        rival = "ordinary regression" if better == "direct" else f"the risk {better}"
+        reporting.say(
+            f"warning: {rival} is better on what was held out than --risk {policy.risk}, which was asked for; without "
+            "--risk the better one is taken"
+        )
+    elif not is_given("risk") and policy.risk != "adaptive":
+        reporting.say(
+            f"note: --risk {policy.risk} is better on what was held out, so it is taken; --risk adaptive keeps what "
+            "was inferred all the same"
+        )
+    for sentence in evaluation.sentences():
+        reporting.say(in_words_of_program(sentence))

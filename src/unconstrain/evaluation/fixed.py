@@ -1,0 +1,33 @@
+"""Equations that all motion obeys: a constraint that never varies hides the policy across it."""
+
+import numpy as np
+
+from unconstrain.constraints.learnt.lines import equation
+from unconstrain.demonstrations import Demonstrations
+
+STILL = 1e-3
+"""A direction with a smaller share of the squared motion is one in which nothing moves."""
+
+
+def find_fixed(demos: Demonstrations) -> tuple[str, ...]:
+    """Find the directions in which no sample moves.
+
+    Parameters
+    ----------
+    demos : Demonstrations
+        Of any number of actions.
+
+    Returns
+    -------
+    tuple of str
+        An equation a direction, "1.000 z_dot ≈ 0"; none for a single action.
+    """
+    U = demos.actions / max(float(np.abs(demos.actions).max()), np.finfo(np.float64).tiny)
+    d = U.shape[1]
+    if d == 1 or len(U) < d:
+        return ()
+    values, vectors = np.linalg.eigh(U.T @ U)
+    total = float(values.sum())
+    return tuple(
+        equation(vectors[:, i], demos.action_names) for i in range(d - 1) if values[i] < STILL * total
+    )

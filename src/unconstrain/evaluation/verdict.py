@@ -1,0 +1,192 @@
+"""What an evaluation comes to, in one sentence: is a constraint there, what explains the motion, is it safe to move."""
+
+import math
+from dataclasses import dataclass
+
+from unconstrain.evaluation.alternatives import Alternative
+from unconstrain.evaluation.following import Following
+
+WELL, BARELY = 0.9, 0.5
+"""Shares explained of what was held out: from the first on a robot may be moved by it, and what is less than the second
+leaves too much that looks like anything."""
+
+LITTLE = 0.01
+"""A difference in what is explained that is not worth a word."""
+
+DETERMINED = 0.9
+"""Share of the policy that recordings have to determine, or else the rest is named."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a verdict is based on.
+
+    Parameters
+    ----------
+    explained, regression : float
+        Share explained of what held-out recordings show, by the policy and by ordinary regression; NaN where nothing
+        moves or it is not known.
+    held_out : str
+        What they are, in words: "held-out episodes", "these recordings".
+    free : float or None
+        Share of samples inferred to be free; None where it was not inferred.
+    known : float
+        Share of samples whose constraint was known, and not inferred.
+    is_regression : bool
+        Whether the policy is ordinary regression, by its risk or since no constraint was found.
+    in_doubt : bool
+        Whether constraints are likely that the model is too coarse to tell.
+    fixed : tuple of str
+        Equations that all motion obeys.
+    tried : tuple of Alternative
+        What was tried in place of the position alone.
+    missing : Alternative or None
+        The one that explains the motion better by far.
+    determined : float or None
+        Share of the policy that the recordings determine; None where it was not looked at.
+    following : Following or None
+        Where it leads from recorded starts.
+    is_stabilized : bool
+        Whether the policy is one that ends at its goal.
+    """
+
+    explained: float
+    regression: float
+    held_out: str
+    free: float | None = None
+    known: float = 0.0
+    is_regression: bool = False
+    in_doubt: bool = False
+    fixed: tuple[str, ...] = ()
+    tried: tuple[Alternative, ...] = ()
+    missing: Alternative | None = None
+    determined: float | None = None
+    following: Following | None = None
+    is_stabilized: bool = False
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What findings come to.
+
+    Parameters
+    ----------
+    is_safe : bool
+        Whether nothing found speaks against letting it move a robot, slowly and watched.
+    sentence : str
+        Why, and what to do.
+    """
+
+    is_safe: bool
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def conclude(found: Findings) -> Verdict:
+    """Conclude from findings whether a policy is fit to be used.
+
+    Parameters
+    ----------
+    found : Findings
+        Of one policy.
+
+    Returns
+    -------
+    Verdict
+        One sentence, of clauses: use it or not, constraints, what explains the motion, what is not determined, where it
+        leads.
+    """
+    if math.isnan(found.explained):
+        return Verdict(False, "nothing moves in these recordings, so they say nothing of a policy")
+    against = _list_objections(found)
+    explained, constraints = _describe_explained(found), _describe_constraints(found)
+    if against:
+        head = "not for a robot yet: "
+        clauses = [*against, constraints] if found.explained < WELL else [*against, constraints, explained]
+    else:
+        head = "safe to try on a robot, slowly: "
+        clauses = [constraints, explained, _describe_following(found)]
+    if found.fixed:
+        clauses.append(
+            f"all motion obeys {' and '.join(found.fixed)}, so nothing is known of the policy across that"
+        )
+    return Verdict(not against, head + "; ".join(clause for clause in clauses if clause))
+
+
+def _list_objections(found: Findings) -> list[str]:
+    against = []
+    if found.explained < WELL:
+        against.append(_describe_missing(found))
+    if found.determined is not None and found.determined < DETERMINED:
+        against.append(
+            f"{1 - found.determined:.0%} of the policy is not determined by these recordings, and `unconstrain "
+            "diagnose` says where and what to record next"
+        )
+    following = found.following
+    if following is not None and following.n_left:
+        where = (
+            f"from {following.n_left} of {following.n_starts} recorded starts it "
+            f"{'diverges' if following.n_diverged else 'leaves what was recorded'}, first after "
+            f"{following.first_left:.2g} s"
+        )
+        remedy = (
+            "" if found.is_stabilized else " (stable_at=end makes it end at the goal, where there is one)"
+        )
+        against.append(where + remedy)
+    return against
+
+
+def _describe_missing(found: Findings) -> str:
+    explained, missing = _describe_explained(found), found.missing
+    if missing is not None:
+        return f"{explained}, and with {missing.meaning} it would be some {missing.explained:.0%} ({missing.option})"
+    if found.tried:
+        best: dict[str, float] = {}
+        for each in found.tried:
+            best[each.meaning] = max(each.explained, best.get(each.meaning, 0.0))
+        names = ", ".join(f"{meaning} {share:.0%}" for meaning, share in best.items())
+        return (
+            f"{explained}, and nothing tried instead explains it ({names}), so a state is missing, or the model is too "
+            "coarse"
+        )
+    return explained
+
+
+def _describe_constraints(found: Findings) -> str:
+    if found.in_doubt:
+        if found.explained < BARELY:
+            return ""  # what is not explained at all looks like anything
+        return "some samples look constrained, but the model is too coarse to tell: try more centres or another kind"
+    if found.free is None:
+        return (
+            "it is ordinary regression, right only if nothing was in the way"
+            if found.is_regression
+            else "every sample was taken for constrained"
+        )
+    if found.known > 1 - LITTLE / 2:
+        return "what was in the way of each sample was known"
+    if found.is_regression or found.free > 1 - LITTLE / 2:
+        return "no varying constraint was found"
+    return f"a varying constraint bent {1 - found.free:.0%} of the samples"
+
+
+def _describe_explained(found: Findings) -> str:
+    gain = found.explained - found.regression
+    by = f"it explains {max(found.explained, 0.0):.1%} of what {found.held_out} show"
+    if found.explained <= LITTLE:
+        by = f"it explains no more of what {found.held_out} show than standing still"
+    if found.is_regression or math.isnan(gain):
+        return by
+    if abs(gain) < LITTLE:
+        return f"{by}, as does ordinary regression"
+    return f"{by}, where ordinary regression explains {max(found.regression, 0.0):.1%}"
+
+
+def _describe_following(found: Findings) -> str:
+    following = found.following
+    if following is None:
+        return "not rolled out, as the recordings have no time, or actions are not velocities of the states"
+    starts = "the recorded start" if following.n_starts == 1 else f"{following.n_starts} recorded starts"
+    return f"from {starts} it stays near what was recorded"

@@ -20,6 +20,9 @@ from unconstrain.spaces import Phased
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
+SHORTEST = 1e-150
+"""Durations (s) that are shorter, or longer than the inverse, over- or underflow."""
+
 
 def add_phase(demos: Demonstrations) -> Demonstrations:
     """Add to states how far their episode has come, as `load(..., phase=True)` does.
@@ -53,7 +56,8 @@ def add_phase(demos: Demonstrations) -> Demonstrations:
     if isinstance(demos.space, Phased):
         raise DataError("these demonstrations have a phase already")
     whole = _whole_episodes(demos)[demos.episodes]
-    durations = [float(np.ptp(demos.time[own])) for own in runs(whole)]
+    with np.errstate(over="ignore"):  # what is infinite is told in a sentence
+        durations = [float(np.ptp(demos.time[own])) for own in runs(whole)]
     space = Phased(demos.space, mean_duration(durations, "these demonstrations"))
     return replace(
         demos,
@@ -93,12 +97,17 @@ def mean_duration(durations: Sequence[float], shown: str) -> float:
     Raises
     ------
     DataError
-        There is none.
+        There is none, or it cannot be computed with.
     """
     lasting = [each for each in durations if each > 0]
     if not lasting:
         raise DataError(f"no episode of {shown} lasts any time, so none has a phase: leave out phase=")
-    return float(np.mean(lasting))
+    found = float(np.mean(lasting))
+    if not SHORTEST < found < 1 / SHORTEST:
+        raise DataError(
+            f"the episodes of {shown} last {found:.3g} s, which is no duration to compute with: correct the stamps"
+        )
+    return found
 
 
 def describe(durations: Sequence[float]) -> str:
@@ -128,7 +137,7 @@ def _whole_episodes(demos: Demonstrations) -> Codes:
     assert demos.time is not None
     time = demos.time
     spans = [(float(time[own].min()), float(time[own].max())) for own in runs(demos.episodes)]
-    numbers: list[int] = []
+    starts: list[bool] = []
     for code, label in enumerate(demos.episode_labels):
         before = code - 1
         goes_on = (
@@ -136,11 +145,11 @@ def _whole_episodes(demos: Demonstrations) -> Codes:
             and _is_next(demos.episode_labels[before], label)
             and spans[code][0] > spans[before][1]
         )
-        numbers.append(numbers[before] if goes_on else max(numbers, default=-1) + 1)
-    return np.array(numbers, dtype=np.int64)
+        starts.append(not goes_on)
+    return np.cumsum(starts) - 1
 
 
 def _is_next(label: str, other: str) -> bool:
     """Whether labels are those of two fragments of an episode that follow each other."""
-    one, two = (re.fullmatch(r"(.*)/(\d+)", each, re.DOTALL) for each in (label, other))
+    one, two = (re.fullmatch(r"(.*)/([0-9]{1,9})", each, re.DOTALL) for each in (label, other))
     return bool(one and two and one[1] == two[1] and int(two[2]) == int(one[2]) + 1)

@@ -128,6 +128,7 @@ def test_a_movement_that_dwells_is_explained_by_its_phase(presses, tmp_path, cap
     assert "--phase" not in capsys.readouterr().out  # it is no guess
     assert run(["rollout", str(policy), "--start", "0,0", "--steps", "110", "--out", str(out),
                 "--figure", str(tmp_path / "movement.png")]) == 0  # fmt: skip
+    assert "phase 1, here after 2 s" in capsys.readouterr().out
     movement = pd.read_csv(out)
     assert np.allclose(movement.phase, np.minimum(movement.t / 2.0, 1.0))
     assert np.hypot(movement.x - 1.0, movement.y - 0.5).min() < 0.05

@@ -182,7 +182,7 @@ def _describe_phase(movement: "Demonstrations", dt: float) -> None:
     over = int((movement.states[:, -1] < 1.0).sum())
     if isinstance(movement.space, Phased) and over + 1 < len(movement):
         reporting.say(
-            f"note: the recorded movements end at phase 1, here after {over * dt:g} s, and from there on the policy acts "
+            f"note: the recorded movements end at phase 1, here after {over * dt:g} s, and then the policy acts "
             f"as at their end; --steps {max(over, 1)} stops there"
         )
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain import demonstrations_file
 from unconstrain.arrays import check_number, check_numbers, check_whole, quote
 from unconstrain.errors import DataError, UnconstrainError, printable
-from unconstrain.spaces import Numbers, Space
+from unconstrain.spaces import Numbers, Phased, Space
 
 MOST_BLOCKS = 2**31
 """In an episode: labels of blocks are whole numbers of 64 bits."""
@@ -321,12 +321,12 @@ class Demonstrations:
         Returns
         -------
         Demonstrations
-            With the names of the first.
+            With the names of the first. Where states have a phase, its duration is the mean over all episodes.
 
         Raises
         ------
         DataError
-            Nothing is given, or their states, actions or forces differ in dimension.
+            Nothing is given, or their states, actions or forces differ in dimension, or states are of different kinds.
         """
         if not several:
             raise DataError("there are no demonstrations to concatenate")
@@ -377,6 +377,7 @@ class Demonstrations:
             projections=joined("projections"),
             forces=joined("forces"),
             free=joined("free"),
+            space=_common_space(several),
             state_names=first.state_names,
             action_names=first.action_names,
             episode_labels=tuple(labels),
@@ -542,6 +543,21 @@ def _space(space: Space | None, X: Array) -> Space:
     if faults.any():
         raise DataError(f"the states of sample {int(np.argmax(faults))} are none of these: {space.words}")
     return space
+
+
+def _common_space(several: Sequence[Demonstrations]) -> Space:
+    """Return what all states are."""
+    first = several[0].space
+    kinds = [each.space.of if isinstance(each.space, Phased) else each.space for each in several]
+    for i, each in enumerate(several):
+        if kinds[i] != kinds[0] or isinstance(each.space, Phased) != isinstance(first, Phased):
+            raise DataError(
+                f"the states of demonstrations 0 and {i} are of different kinds: {first.words}; and {each.space.words}"
+            )
+    durations = [each.space.duration for each in several if isinstance(each.space, Phased)]
+    if len(set(durations)) < 2:
+        return first
+    return Phased(kinds[0], float(np.average(durations, weights=[each.n_episodes for each in several])))
 
 
 def _episodes(

@@ -20,11 +20,12 @@ def explained(printed: str) -> str:
 
 def test_the_commands_print_what_the_page_says(tmp_path, capsys):
     names: dict = {}
+    shares = []
     with contextlib.chdir(tmp_path):
-        for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
-            exec(block, names)
-        shares = []
-        for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL):
+        for language, block in re.findall(r"```(python|sh)\n(.*?)```", PAGE, flags=re.DOTALL):
+            if language == "python":
+                exec(block, names)
+                continue
             for command in block.replace("\\\n", " ").strip().splitlines():
                 assert run(shlex.split(command)[1:]) == 0
                 printed = capsys.readouterr().out
@@ -32,7 +33,10 @@ def test_the_commands_print_what_the_page_says(tmp_path, capsys):
                     shares.append(explained(printed))
         movement = np.loadtxt("cup-there.csv", delimiter=",", skiprows=1)
     assert shares == re.findall(
-        r"[\d.]+ %", "".join(re.findall(r"\n(?:The policy|The first) explains.*", PAGE))
+        r"-?[\d.]+ %", "".join(re.findall(r"\n(?:The policy|The first) explains.*", PAGE))
+    )
+    assert capsys.readouterr().out.splitlines() == re.findall(
+        r"[\d.]+ m(?= of the button| from the button)", PAGE
     )
     assert np.allclose(np.linalg.norm(movement[:, 4:8], axis=1), 1.0)
     assert np.allclose(np.abs(movement[-1, 1:8]), [1, 2, 0, 0, 0, 0.7071, 0.7071], atol=1e-3)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation as Rotations
 import unconstrain as uc
 from unconstrain.constraints.nullspace import in_metric, projection
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.spaces import Angle, Numbers, Pose, Product, Rotation, SecondOrder
+from unconstrain.spaces import Angle, Numbers, Phased, Pose, Product, Rotation, SecondOrder
 
 POLICIES = [
     lambda **options: uc.ParametricPolicy(uc.NormalizedRBF(20), **options),
@@ -17,7 +17,7 @@ POLICIES = [
 ]
 
 
-def reaches(space: Pose, count: int = 8, steps: int = 80, dt: float = 0.04):
+def reaches(space: Pose, count: int = 6, steps: int = 40, dt: float = 0.08):
     """Let poses go to the origin: states (N, n), actions (N, 6) and episodes (N,)."""
     rng = np.random.default_rng(0)
     X = np.tile(space.origin, (count, 1))
@@ -108,10 +108,39 @@ def test_states_with_velocities_are_followed_by_accelerations():
     assert movement.states[500] == pytest.approx([-1.0, 0.0], abs=0.02)
 
 
+@pytest.mark.parametrize("make", POLICIES)
+def test_a_phase_is_followed_to_the_end_and_held_there(make, tmp_path):
+    space = Phased(Numbers(1), 2.0)
+    s = np.tile(np.linspace(0, 1, 60), 5)
+    start = np.repeat(np.random.default_rng(0).normal(size=5), 60)
+    X = np.column_stack([start + 4 * s * (1 - s), s])
+    U = (2 - 4 * s)[:, None]
+    policy = make(space=space, risk="direct", alpha=1e-6).fit(X, U, groups=np.repeat(np.arange(5), 60))
+    movement = policy.rollout(space.at_rest(np.zeros(1)), steps=120, dt=0.02)
+    assert movement.space == space
+    assert np.allclose(movement.states[:, 1], np.minimum(movement.time / 2.0, 1.0))
+    there = movement.states[:101, 1]
+    assert np.abs(movement.states[:101, 0] - 4 * there * (1 - there)).max() < 0.1
+    policy.save(tmp_path / "policy.skops")
+    assert uc.load_policy(tmp_path / "policy.skops").space_ == space
+    step = policy.compile()
+    step.save(tmp_path / "step.npz")
+    step = uc.load_compiled(tmp_path / "step.npz")
+    assert np.abs(step(X) - policy.predict(X)).max() < 1e-12
+    late = np.array([0.3, 1.7])  # the clock of a controller goes on
+    assert np.allclose(step(late), policy.predict([[0.3, 1.0]])[0], atol=1e-12)
+    with pytest.raises(PolicyError, match=r"compile\(\).save"):
+        policy.to_onnx(tmp_path / "policy.onnx")
+    stable = policy.stabilized([0.0, 1.0], X)
+    assert np.abs(stable.compile()(X) - stable.predict(X)).max() < 1e-9
+    with pytest.raises(DataError, match="sample 0 are none of these: 1 number, and a phase from 0 to 1"):
+        make(space=space).fit(X + np.array([0.0, 1.5]), U)
+
+
 def test_states_that_are_no_rotation_are_refused_in_a_sentence():
     X, U, groups = reaches(Pose())
     X[7, 3:] = [0, 0, 0, 0.5]
-    with pytest.raises(DataError, match="sample 7 are no rotation"):
+    with pytest.raises(DataError, match="sample 7 are none of these: poses"):
         uc.ParametricPolicy(space=Pose()).fit(X, U, groups=groups)
     X, U, groups = reaches(Pose())
     policy = uc.ParametricPolicy(space=Pose()).fit(X, U, groups=groups)

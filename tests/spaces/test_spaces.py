@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Rotations
 
 from unconstrain.errors import UnconstrainError
-from unconstrain.spaces import Angle, Numbers, Pose, Product, Rotation, SecondOrder, from_description
+from unconstrain.spaces import Angle, Numbers, Phased, Pose, Product, Rotation, SecondOrder, from_description
 
 ROTATIONS = [
     Rotation(written, frame, degrees)
@@ -29,6 +29,8 @@ SPACES = [
     MIXED,
     SecondOrder(MIXED),
     SecondOrder(Pose()),
+    Phased(MIXED, 4.0),
+    Phased(SecondOrder(Pose()), 2.5),
 ]
 
 seeds = st.integers(0, 2**32 - 1)
@@ -36,11 +38,13 @@ seeds = st.integers(0, 2**32 - 1)
 
 def states(space, rng, count=5):
     """Draw states (count, n)."""
+    if isinstance(space, Phased):
+        return np.hstack([states(space.of, rng, count), rng.random((count, 1))])
     return space.step(np.tile(space.origin, (count, 1)), rng.normal(size=(count, space.n_actions)), 1.0)
 
 
 def first_order(space):
-    return not isinstance(space, SecondOrder)
+    return not isinstance(without_phase(space), SecondOrder)
 
 
 @pytest.mark.parametrize("space", SPACES, ids=lambda space: space.words)
@@ -50,7 +54,7 @@ def test_a_difference_leads_from_one_state_to_the_other(space, seed):
     rng = np.random.default_rng(seed)
     X, Y = states(space, rng), states(space, rng)
     if not first_order(space):
-        X[:, : space.of.n_states] = Y[:, : space.of.n_states]  # accelerations change velocities
+        X[:, : base(space).n_states] = Y[:, : base(space).n_states]  # accelerations change velocities
     reached = space.step(X, space.difference(X, Y), 1.0)
     assert np.abs(space.difference(reached, Y)).max() < 1e-9
     assert np.abs(space.difference(X, X)).max() < 1e-12
@@ -63,7 +67,7 @@ def test_what_is_relative_can_be_undone(space, seed):
     rng = np.random.default_rng(seed)
     X, to = states(space, rng), states(space, rng)
     if not first_order(space):
-        to[:, space.of.n_states :] = 0.0
+        to[:, base(space).n_states :] = 0.0
     back = space.absolute(space.relative(X, to), to)
     assert np.abs(base(space).difference(x(space, back), x(space, X))).max() < 1e-9
     itself = space.relative(to, to)
@@ -72,7 +76,9 @@ def test_what_is_relative_can_be_undone(space, seed):
     )
 
 
-@pytest.mark.parametrize("space", [*ROTATIONS, *POSES, MIXED], ids=lambda space: space.words)
+@pytest.mark.parametrize(
+    "space", [*ROTATIONS, *POSES, MIXED, Phased(MIXED, 4.0)], ids=lambda space: space.words
+)
 def test_relative_velocities_are_those_of_relative_states(space):
     rng = np.random.default_rng(0)
     X, to, U, moves = (
@@ -87,7 +93,9 @@ def test_relative_velocities_are_those_of_relative_states(space):
     assert np.allclose(space.absolute_velocity(still, to), U, atol=1e-12)
 
 
-@pytest.mark.parametrize("space", [*ROTATIONS, *POSES, MIXED], ids=lambda space: space.words)
+@pytest.mark.parametrize(
+    "space", [*ROTATIONS, *POSES, MIXED, Phased(MIXED, 4.0)], ids=lambda space: space.words
+)
 def test_slopes_of_coordinates_are_velocities(space):
     rng = np.random.default_rng(1)
     X, U = states(space, rng, 1), rng.normal(size=(1, space.n_actions))
@@ -176,8 +184,44 @@ def test_rows_that_are_no_rotation_are_found():
     assert Rotation("matrix").faults(mirror).all()
 
 
+@given(seed=seeds, dt=st.floats(0.0, 10.0), share=st.floats(0.0, 1.0))
+@settings(max_examples=30, deadline=None)
+def test_a_phase_goes_by_the_clock_is_held_at_the_end_and_has_no_frame(seed, dt, share):
+    rng = np.random.default_rng(seed)
+    space = Phased(MIXED, 4.0)
+    X, to, U = states(space, rng), states(space, rng), rng.normal(size=(5, space.n_actions))
+    moved = space.step(X, U, dt)
+    assert np.allclose(moved[:, -1], np.minimum(X[:, -1] + dt / 4.0, 1.0), atol=1e-12)
+    assert np.array_equal(moved[:, :-1], MIXED.step(X[:, :-1], U, dt))
+    assert np.array_equal(space.step(space.step(X, U, 4.0), U, dt)[:, -1], np.ones(5))
+    between = space.between(X, moved, np.full(5, share))
+    assert np.allclose(between[:, -1], (1 - share) * X[:, -1] + share * moved[:, -1], atol=1e-12)
+    for same in (space.relative(X, to), space.absolute(X, to), space.follow(X)):
+        assert np.array_equal(same[:, -1], X[:, -1])
+    late = X + np.append(np.zeros(space.n_states - 1), 1.0)
+    assert space.faults(late).all()
+    for zero in (space.find_base(X), None):
+        assert np.array_equal(space.embed(late, zero)[:, -1], np.ones(5))
+        assert np.array_equal(
+            space.embed(X, zero)[:, :-1], MIXED.embed(X[:, :-1], None if zero is None else zero[:-1])
+        )
+
+
+def test_what_is_at_rest_begins_its_phase():
+    space = Phased(SecondOrder(Numbers(2)), 3.0)
+    assert space.at_rest(np.array([1.0, 2.0])).tolist() == [1.0, 2.0, 0.0, 0.0, 0.0]
+    assert space.state_names(["x", "y", "x_dot", "y_dot"])[-1] == "phase"
+    with pytest.raises(ValueError, match="duration must be a positive number"):
+        Phased(Numbers(1), 0.0)
+
+
+def without_phase(space):
+    return space.of if isinstance(space, Phased) else space
+
+
 def base(space):
-    return space.of if isinstance(space, SecondOrder) else space
+    moving = without_phase(space)
+    return moving.of if isinstance(moving, SecondOrder) else moving
 
 
 def x(space, X):

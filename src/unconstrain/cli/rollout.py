@@ -118,6 +118,7 @@ def rollout(
     end = zip(movement.state_names, movement.states[-1], movement.states.std(axis=0), strict=True)
     reached = ", ".join(f"{name} {reporting.shown_number(value, scale)}" for name, value, scale in end)
     reporting.say(f"after {taken * dt:g} s: {reached}")
+    _describe_phase(movement, dt)
     if arrival is not None:
         reporting.say(arrival)
     if unsure is not None and taken < steps:
@@ -172,6 +173,18 @@ def _out_of(frame: "Frame", movement: "Demonstrations") -> "Demonstrations":
         policy=None if wanted is None else frame.velocities_out_of(wanted),
         projections=None,  # which files of text do not hold
     )
+
+
+def _describe_phase(movement: "Demonstrations", dt: float) -> None:
+    """Say when the recorded movements would have ended, if they have a phase and the rollout goes on after that."""
+    from unconstrain.spaces import Phased
+
+    over = int((movement.states[:, -1] < 1.0).sum())
+    if isinstance(movement.space, Phased) and over + 1 < len(movement):
+        reporting.say(
+            f"note: the recorded movements end at phase 1, here after {over * dt:g} s, and then the policy acts "
+            f"as at their end; --steps {max(over, 1)} stops there"
+        )
 
 
 def _completed(numbers: list[float], option: str, space: "Space") -> "np.ndarray":

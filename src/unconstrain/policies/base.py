@@ -925,9 +925,7 @@ def _check_in_space(space: Any, X: np.ndarray) -> None:
         )
     faults = space.faults(X)
     if faults.any():
-        raise DataError(
-            f"the states of sample {int(np.argmax(faults))} are no rotation; these are {space.words}, of norm 1"
-        )
+        raise DataError(f"the states of sample {int(np.argmax(faults))} are none of these: {space.words}")
 
 
 def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""What states and actions are, and over how long states are smoothed, is decided once for all, by the first."""
+"""What states and actions are, over how long states are smoothed, how long episodes take: decided once for all."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from unconstrain.recordings.actions import ActionKind, find_kind
 from unconstrain.recordings.blocks import number_values
 from unconstrain.recordings.columns import DIFFERENTIATE
 from unconstrain.recordings.notes import Note
+from unconstrain.recordings.phase import describe, mean_duration
 from unconstrain.recordings.pieces import Piece, read_numbers
 from unconstrain.recordings.preparing.filling import fill_columns
 from unconstrain.recordings.preparing.motion import follow_states, resample
@@ -21,7 +23,8 @@ from unconstrain.recordings.preparing.timing import time_rows
 from unconstrain.recordings.recording import FIRST_ROWS, Recording, distinct
 from unconstrain.recordings.smoothing import find_smoothing
 from unconstrain.recordings.states import FirstRows, arrange_reference, find_frame, find_space, in_frame
-from unconstrain.spaces import Numbers, Space
+from unconstrain.recordings.steps import runs
+from unconstrain.spaces import Numbers, Phased, Space
 from unconstrain.spaces.frames import takes_frame
 
 WORLD = "angular velocities are in the world's frame, in rad/s; angular_velocity=body takes the body's"
@@ -133,6 +136,11 @@ def _check_relative(recording: Recording, space: Space) -> None:
             f"{shown}: relative_to= takes start, goal, or one column for each of the {n} states, and stands for "
             f"{count} here"
         )
+    if isinstance(space, Phased) and (how.phase or how.order == 2 or how.moving_centre is not None):
+        raise DataError(
+            f"{shown}: these states have a phase already; give phase=, order= and moving_centre= where the recordings "
+            "are read that they were made of"
+        )
     if count and takes_frame(space, count) and how.order == 2:
         raise DataError(
             f"{shown}: order=2 and relative_to= a frame go together for states that are poses only"
@@ -232,6 +240,65 @@ def decide_smoothing(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     codes = np.concatenate([rows.codes + n for rows, n in zip(parts, before, strict=False)])
     found = find_smoothing(X, time, codes, window=smoothed[0].preparation.window)
     return tuple(replace(each, smoothing=found) if each.smooths else each for each in recordings)
+
+
+def decide_duration(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], tuple[Note, ...]]:
+    """Find how long an episode takes, where states get a phase: the mean over all of them, of all recordings.
+
+    Nothing but stamps and episodes is read for it.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    tuple of Recording
+        Each with that duration.
+    tuple of Note
+        What a phase means.
+
+    Raises
+    ------
+    DataError
+        Stamps cannot be read, or no episode lasts any time.
+    """
+    if not recordings[0].preparation.phase:
+        return tuple(recordings), ()
+    durations = [each for recording in recordings for each in _durations(recording)]
+    found = mean_duration(durations, recordings[0].shown)
+    return tuple(replace(each, duration=found) for each in recordings), (
+        Note("phase", "", describe(durations)),
+    )
+
+
+def _durations(recording: Recording) -> list[float]:
+    """Return how long (s) episodes last, without those that are left out for being short."""
+    time = recording.roles.time
+    episode = () if recording.roles.episode is None else (recording.roles.episode,)
+    fields = recording.roles.state[:1] if time is None else (time,)
+    ends: dict[Any, tuple[Any, Any]] = {}
+    for piece in recording.read_pieces(distinct(fields, episode)):
+        # Rows that are left out count too where time is counted by rows: they took their time.
+        (timed,) = [piece] if time is None else recording.complete([piece], ("time",))
+        if not len(timed.rows):
+            continue
+        codes, found = number_values(recording.labels([timed]))
+        if time is None:
+            ticks = np.empty(len(codes))
+            for own, label in zip(runs(codes), found, strict=True):
+                ticks[own] = np.arange(len(own)) + (ends[label][1] + 1 if label in ends else 0)
+        else:
+            ticks = recording.clock.ticks(timed.alike(time, "time"))
+        for own, label in zip(runs(codes), found, strict=True):
+            first, last = ticks[own].min(), ticks[own].max()
+            before = ends.get(label, (first, last))
+            ends[label] = min(first, before[0]), max(last, before[1])
+    a_second = recording.preparation.rate if time is None else recording.clock.ticks_a_second
+    assert a_second is not None
+    lasted = [float(last - first) / a_second for first, last in ends.values()]
+    least = recording.shortest if recording.preparation.drops("short") else 0.0
+    return [each for each in lasted if each >= least]
 
 
 def _coordinates(space: Space, rows: Rows) -> NDArray[np.float64]:

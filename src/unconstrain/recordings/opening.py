@@ -12,7 +12,7 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.assembling import make_recording
 from unconstrain.recordings.batches import FORMS
 from unconstrain.recordings.columns import GOAL, START, Columns
-from unconstrain.recordings.deciding import decide_kind, decide_smoothing, decide_space
+from unconstrain.recordings.deciding import decide_duration, decide_kind, decide_smoothing, decide_space
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.files import short_names
 from unconstrain.recordings.formats.frame import Frame, is_frame
@@ -176,4 +176,6 @@ def _as_tables(recordings: Sequence[Recording], preparation: Preparation) -> Tab
     first = recordings[0]
     led = [first, *(replace(each, leader=first) for each in recordings[1:])]
     placed, notes = decide_space(led)
-    return Tables(decide_smoothing(decide_kind(placed, preparation.action_is)), notes)
+    smoothed = decide_smoothing(decide_kind(placed, preparation.action_is))
+    timed, found = decide_duration(smoothed)
+    return Tables(timed, (*notes, *found))

@@ -87,11 +87,14 @@ class Preparation:
         default, which is noted; of others it is the world's.
     order : int
         2 adds velocities to the states, and makes accelerations the actions: for movements that cross themselves.
+    phase : bool
+        Add to the states how far an episode has come, from 0 at its start to 1 at its end: for movements that dwell, or
+        that come back the way they went. The policy goes by the clock then.
 
     Raises
     ------
     DataError
-        A number is not positive and finite, or a word is none of those that are known.
+        A number is not positive and finite, `phase` is no truth value, or a word is none of those that are known.
     """
 
     time_unit: str | None = None
@@ -110,6 +113,7 @@ class Preparation:
     angle_unit: str | None = None
     angular_velocity: str | None = None
     order: int = 1
+    phase: bool = False
 
     def __post_init__(self) -> None:
         for name, words in CHOICES.items():
@@ -124,9 +128,11 @@ class Preparation:
             )
         if isinstance(self.order, bool) or self.order not in ORDERS:
             raise DataError(f"order must be 1 or 2, got {show(self.order)}")
+        if not isinstance(self.phase, bool):
+            raise DataError(f"phase must be True or False, got {show(self.phase)}")
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name in (*CHOICES, "drop") or value is None:
+            if field.name in (*CHOICES, "drop", "phase") or value is None:
                 continue
             try:
                 number = float(value)

@@ -22,7 +22,7 @@ from unconstrain.recordings.smoothing import Smoothing
 from unconstrain.recordings.steps import runs
 from unconstrain.recordings.table import Field
 from unconstrain.recordings.time import Clock
-from unconstrain.spaces import Numbers, SecondOrder, Space
+from unconstrain.spaces import Numbers, Phased, SecondOrder, Space
 
 Codes = NDArray[np.int64]
 
@@ -85,6 +85,8 @@ class Recording:
         What the states in the files are, where they are no plain numbers.
     smoothing : Smoothing, optional
         Where something is differentiated, what was found of the states' noise.
+    duration : float, optional
+        Where states get a phase, how long an episode takes (s).
     """
 
     shown: str
@@ -102,6 +104,7 @@ class Recording:
     leader: "Recording | None" = None
     known_space: Space | None = None
     smoothing: Smoothing | None = None
+    duration: float | None = None
 
     @property
     def recorded_space(self) -> Space:
@@ -111,6 +114,14 @@ class Recording:
     @property
     def space(self) -> Space:
         """What the states of samples are."""
+        if not self.preparation.phase:
+            return self._moving_space
+        assert self.duration is not None
+        return Phased(self._moving_space, self.duration)
+
+    @property
+    def _moving_space(self) -> Space:
+        """What the states of samples are, without their phase."""
         return SecondOrder(self.recorded_space) if self.preparation.order == 2 else self.recorded_space
 
     @property
@@ -122,7 +133,10 @@ class Recording:
     def state_names(self) -> tuple[str, ...]:
         """The names of the states of samples."""
         names = self.roles.state_names
-        return SecondOrder(self.recorded_space).state_names(names) if self.preparation.order == 2 else names
+        if self.preparation.order == 2:
+            names = SecondOrder(self.recorded_space).state_names(names)
+        space = self.space
+        return space.state_names(names) if self.preparation.phase and isinstance(space, Phased) else names
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -134,7 +148,7 @@ class Recording:
     @property
     def changes_states(self) -> bool:
         """Whether the states of samples are others than lie in the files, and not only smoother ones."""
-        return self.is_relative or self.preparation.order == 2
+        return self.is_relative or self.preparation.order == 2 or self.preparation.phase
 
     @cached_property
     def n_rows(self) -> int:
@@ -236,6 +250,8 @@ class Recording:
             return "differentiate" if self.differentiates else "split"
         if self.is_relative:
             return "find what is relative in"
+        if self.preparation.phase:
+            return "find the phase of"
         if self.unwraps or self.preparation.drop is not None:
             return "unwrap" if self.unwraps else "drop samples of"
         return "filter the forces of" if self.makes_projections and self.roles.force else None
@@ -364,7 +380,7 @@ class Recording:
         fields = [*roles.state, *roles.action]
         columns: tuple[ColumnKey, ...] = ()
         made = self.makes_projections
-        if roles.time is not None and (everything or self.splits or self.is_relative):
+        if roles.time is not None and (everything or self.splits or self.changes_states):
             fields.append(roles.time)
         fields += roles.reference
         if everything or self.reads_projections:

@@ -130,6 +130,7 @@ def assign_roles(
     untimed += [f'drop="{what}"' for what in ("duplicates", "pauses") if preparation.drops(what)]
     untimed += ["relative_to"] if roles.reference else []  # such columns may move
     untimed += ["order"] if preparation.order > 1 else []
+    untimed += ["phase"] if preparation.phase else []
     if untimed and roles.time is None and preparation.rate is None:
         raise DataError(
             f"{shown}: {untimed[0]} needs to know the time of each sample; give time= or rate= too"

@@ -322,6 +322,7 @@ def open(
     angle_unit: str | None = None,
     angular_velocity: str | None = None,
     order: int | None = None,
+    phase: bool | None = None,
     columns: Columns | None = None,
     preparation: Preparation | None = None,
 ) -> Recordings:
@@ -349,7 +350,7 @@ def open(
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
         What is done to the samples; see `Preparation`.
-    angle_unit, angular_velocity, order : optional
+    angle_unit, angular_velocity, order, phase : optional
         What states and actions are; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.
@@ -399,7 +400,7 @@ def open(
             "window": window, "gap": gap, "max_speed": max_speed, "min_speed": min_speed,
             "min_duration": min_duration, "force_threshold": force_threshold,
             "moving_centre": moving_centre, "time_axis": time_axis, "angle_unit": angle_unit,
-            "angular_velocity": angular_velocity, "order": order,
+            "angular_velocity": angular_velocity, "order": order, "phase": phase,
         },
     )  # fmt: skip
     if isinstance(source, Recordings):
@@ -463,7 +464,7 @@ def load(*args: Any, **kwargs: Any) -> Demonstrations:
         What is done to the samples; see `Preparation`.
     window, gap, max_speed, min_speed, min_duration, force_threshold, moving_centre, time_axis : optional
         What is done to the samples; see `Preparation`.
-    angle_unit, angular_velocity, order : optional
+    angle_unit, angular_velocity, order, phase : optional
         What states and actions are; see `Preparation`.
     columns : Columns, optional
         Instead of single columns.

@@ -7,6 +7,7 @@ from unconstrain.errors import UnconstrainError
 from unconstrain.spaces.angle import Angle
 from unconstrain.spaces.base import Space
 from unconstrain.spaces.numbers import Numbers
+from unconstrain.spaces.phased import Phased
 from unconstrain.spaces.product import Pose, Product
 from unconstrain.spaces.rotation import Rotation
 from unconstrain.spaces.second_order import SecondOrder
@@ -39,6 +40,8 @@ def from_description(about: Mapping[str, Any]) -> Space:
             return Rotation(about["rotation"], about["frame"], bool(about["degrees"]))
         if "second_order" in about:
             return SecondOrder(from_description(about["second_order"]))
+        if "phased" in about:
+            return Phased(from_description(about["phased"]), float(about["duration"]))
         columns = tuple(tuple(int(i) for i in own) for own in about["columns"])
         if "pose" in about:
             return Pose((Numbers(3), from_description(about["pose"])), columns)

@@ -7,6 +7,7 @@ import numpy as np
 from unconstrain.errors import DataError
 from unconstrain.spaces.base import Array, Space
 from unconstrain.spaces.numbers import Numbers
+from unconstrain.spaces.phased import Phased
 from unconstrain.spaces.product import Pose
 
 POSITIONS = Numbers(3)
@@ -15,7 +16,11 @@ POSITIONS = Numbers(3)
 
 def takes_frame(space: Space, count: int) -> bool:
     """Whether states of a space are positions, and `count` numbers are the pose that they are relative to."""
-    return space == POSITIONS and count == Pose().n_states
+    return _without_phase(space) == POSITIONS and count == Pose().n_states
+
+
+def _without_phase(space: Space) -> Space:
+    return space.of if isinstance(space, Phased) else space
 
 
 def relate(space: Space, X: Array, U: Array, to: Array, moves: Array) -> tuple[Array, Array]:
@@ -45,7 +50,8 @@ def relate(space: Space, X: Array, U: Array, to: Array, moves: Array) -> tuple[A
         return space.relative(X, to), space.relative_velocity(X, U, to, moves)
     pose, none = Pose(), np.zeros((len(X), 3))
     lifted, moving = _lift(X), np.hstack([U, none])
-    return pose.relative(lifted, to)[:, :3], pose.relative_velocity(lifted, moving, to, moves)[:, :3]
+    placed = pose.relative(lifted, to)[:, :3]
+    return np.hstack([placed, X[:, 3:]]), pose.relative_velocity(lifted, moving, to, moves)[:, :3]
 
 
 @dataclass(frozen=True)
@@ -86,7 +92,7 @@ class Frame:
         """Undo `into`."""
         if len(self.at) == self.space.n_states:
             return self.space.absolute(X, self._to(len(X)))
-        return self._kind.absolute(_lift(X), self._to(len(X)))[:, :3]
+        return np.hstack([self._kind.absolute(_lift(X), self._to(len(X)))[:, :3], X[:, 3:]])
 
     def velocities_out_of(self, U: Array) -> Array:
         """Turn velocities (N, d) in the frame into those that are not."""
@@ -108,5 +114,5 @@ class Frame:
 
 
 def _lift(X: Array) -> Array:
-    """Make poses (N, 7) without a rotation of positions (N, 3)."""
-    return np.hstack([X, np.zeros((len(X), 3)), np.ones((len(X), 1))])
+    """Make poses (N, 7) without a rotation of positions (N, 3), which a phase may follow."""
+    return np.hstack([X[:, :3], np.zeros((len(X), 3)), np.ones((len(X), 1))])

@@ -40,6 +40,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.recordings.preparation": ("Preparation",),
     "unconstrain.spaces.angle": ("Angle",),
     "unconstrain.spaces.numbers": ("Numbers",),
+    "unconstrain.spaces.phased": ("Phased",),
     "unconstrain.spaces.product": ("Pose", "Product"),
     "unconstrain.spaces.rotation": ("Rotation",),
     "unconstrain.spaces.second_order": ("SecondOrder",),

@@ -38,7 +38,8 @@ def fit_command(paths: Sequence[str | os.PathLike[str]], columns: Columns, prepa
             value = getattr(carrier, field.name)
             if value is not None and value != field.default:
                 written = _written(value) if carrier is columns else str(value)
-                parts += [f"--{field.name.replace('_', '-')}", shlex.quote(written)]
+                name = f"--{field.name.replace('_', '-')}"
+                parts += [name] if value is True else [name, shlex.quote(written)]
     return " ".join([*parts, "--out", _path(_output(os.fspath(paths[0])))])
 
 

@@ -13,6 +13,7 @@ from unconstrain.recordings.preparing.motion import (
     relate,
     resample,
 )
+from unconstrain.recordings.preparing.phasing import add_phase, find_phase
 from unconstrain.recordings.preparing.projecting import make_projections
 from unconstrain.recordings.preparing.reading import read
 from unconstrain.recordings.preparing.resting import find_rest
@@ -29,6 +30,7 @@ Rows with which it has nothing to do it returns as they are. It changes no array
 STEPS: tuple[Step, ...] = (
     time_rows,
     fill_columns,
+    find_phase,
     follow_states,
     split_rows,
     divide_increments,
@@ -38,6 +40,7 @@ STEPS: tuple[Step, ...] = (
     find_rest,
     make_projections,
     accelerate,
+    add_phase,
 )
 """What lies between reading rows and labelling samples."""
 

@@ -17,7 +17,7 @@ from unconstrain.recordings.steps import runs
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
-BETWEEN = ("X", "U", "forces", "policy", "reference")
+BETWEEN = ("X", "U", "forces", "policy", "reference", "phase")
 """What is interpolated linearly; of everything else a grid takes the nearest row. States that are no plain numbers are
 interpolated by `preparing.motion`."""
 
@@ -49,6 +49,8 @@ class Rows:
     projections : ndarray of shape (N, d, d) or None
     reference : ndarray of shape (N, n) or None
         What the states are relative to.
+    phase : ndarray of shape (N, 1) or None
+        How far each row's episode has come, from 0 to 1.
     resting : ndarray of shape (N,) or None
         Whether a row is in a pause.
     """
@@ -65,6 +67,7 @@ class Rows:
     policy: Array | None = None
     projections: Array | None = None
     reference: Array | None = None
+    phase: Array | None = None
     resting: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:

@@ -23,7 +23,7 @@ def time_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
         Stamps that do not increase strictly within an episode.
     """
     recording = portion.recording
-    needed = portion.everything or recording.splits or recording.is_relative
+    needed = portion.everything or recording.splits or recording.changes_states
     if not (recording.timed and needed and len(rows)):
         return rows, ()
     notes: Notes = ()

@@ -8,8 +8,8 @@ COLUMNS = ("--state", "x1,x2", "--action", "u1,u2", "--episode", "episode")
 
 
 def share(line):
-    """The first percentage in a line, as a fraction."""
-    return float(line.split("%")[0].split()[-1]) / 100
+    """The last percentage in a line, that of what is shown, as a fraction."""
+    return float(line.split("%")[-2].split()[-1]) / 100
 
 
 def start(*arguments, **options):

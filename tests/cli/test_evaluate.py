@@ -17,7 +17,7 @@ def test_recordings_are_read_as_when_the_policy_was_fitted(run, movements, tmp_p
     toy.demonstrate(5, random_state=1).save(others)
     code, out, _ = run("evaluate", "policy.skops", others, "--state", "states", "--action", "actions")
     assert code == 0
-    (everything,) = (line for line in out.splitlines() if line.startswith("│ all "))
+    (everything,) = (line for line in out.splitlines() if line.startswith("│ policy "))
     assert share(everything) > 0.9
     assert "°" in everything
     assert "of the recordings it was learnt from" in out

@@ -1,8 +1,8 @@
 import pytest
 
 import unconstrain as uc
-from unconstrain.evaluation import compare_risks
 from unconstrain.demo import draw_recordings, make_policy
+from unconstrain.evaluation import compare_risks
 from unconstrain.limit_cycle import demonstrate
 
 DEMOS = demonstrate(20, random_state=0)

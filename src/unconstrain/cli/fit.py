@@ -139,7 +139,7 @@ def fit(
     if figure is not None:
         reporting.say(f"figure: {figure}")
     to = recorded.columns.relative_to
-    if evaluation.verdict.is_safe:
+    if evaluation.verdict.is_of_use:
         _suggest(out, demos, needs_goal=to is not None and to != START)
     else:
         reporting.say(f"policy: {out}")

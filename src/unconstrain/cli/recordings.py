@@ -58,6 +58,7 @@ class Recorded:
             "relative_to": columns.relative_to is not None,
             "moving_centre": how.moving_centre is not None,
             "order": how.order == 2,
+            "phase": how.phase,
         }
         return frozenset(name for name, is_used in used.items() if is_used)
 

@@ -113,6 +113,7 @@ def say_table(columns: Sequence[str], rows: Sequence[Sequence[str]], title: str 
     from rich.table import Table
 
     table = Table(*columns, title=title)
+    table.columns[0].no_wrap = True  # names stand in one line
     for row in rows:
         table.add_row(*map(visible, row))
     width = (

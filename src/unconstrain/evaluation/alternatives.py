@@ -14,10 +14,11 @@ from unconstrain.policies import ParametricPolicy
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inferred import finds_no_contact
 from unconstrain.recordings.derivative import differentiate, longest_window
+from unconstrain.recordings.phase import add_phase
 from unconstrain.recordings.relative import GOAL, START, end_of, moving_centre
 from unconstrain.recordings.smoothing import find_smoothing
 from unconstrain.selection import select_policy
-from unconstrain.spaces import Numbers, SecondOrder
+from unconstrain.spaces import Numbers, Phased, SecondOrder
 from unconstrain.spaces.frames import relate
 
 Array = NDArray[np.float64]
@@ -178,8 +179,8 @@ def _list_views(
             yield "a centre that moves", f"moving_centre={seconds:g}", lambda: _centre(demos, seconds)
     if moves and "order" not in without:
         yield "velocity", "order=2", lambda: _accelerate(demos)
-    if "phase" not in without:
-        yield "phase, how far it has come", "phase=True", lambda: _add_phase(demos)
+    if "phase" not in without and not isinstance(space, Phased):
+        yield "phase, how far it has come", "phase=True", lambda: add_phase(demos)
 
 
 def find_turn(demos: Demonstrations) -> float | None:
@@ -243,16 +244,6 @@ def _accelerate(demos: Demonstrations) -> Demonstrations:
         U[own] = differentiate(demos.actions[own], time, window=min(found, longest_window(time)))
     X = np.hstack([demos.states, demos.actions])
     return Demonstrations(X, U, demos.episodes, demos.time, space=SecondOrder(demos.space))
-
-
-def _add_phase(demos: Demonstrations) -> Demonstrations:
-    assert demos.time is not None
-    phase = np.empty(len(demos))
-    for own in _episodes(demos):
-        time = demos.time[own]
-        phase[own] = (time - time[0]) / max(float(time[-1] - time[0]), np.finfo(np.float64).tiny)
-    X = np.column_stack([demos.states, phase])
-    return Demonstrations(X, demos.actions, demos.episodes, demos.time)
 
 
 def _thin(demos: Demonstrations, jumps: Jumps | None) -> Demonstrations:

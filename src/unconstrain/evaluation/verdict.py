@@ -73,11 +73,14 @@ class Verdict:
     ----------
     is_safe : bool
         Whether nothing found speaks against letting it move a robot, slowly and watched.
+    is_of_use : bool
+        Whether it explains more than half of what is shown: in simulation it is worth a look.
     sentence : str
         Why, and what to do.
     """
 
     is_safe: bool
+    is_of_use: bool
     sentence: str
 
     def __str__(self) -> str:
@@ -99,7 +102,7 @@ def conclude(found: Findings) -> Verdict:
         leads.
     """
     if math.isnan(found.explained):
-        return Verdict(False, "nothing moves in these recordings, so they say nothing of a policy")
+        return Verdict(False, False, "nothing moves in these recordings, so they say nothing of a policy")
     against = _list_objections(found)
     explained, constraints = _describe_explained(found), _describe_constraints(found)
     if against:
@@ -112,7 +115,9 @@ def conclude(found: Findings) -> Verdict:
         clauses.append(
             f"all motion obeys {' and '.join(found.fixed)}, so nothing is known of the policy across that"
         )
-    return Verdict(not against, head + "; ".join(clause for clause in clauses if clause))
+    return Verdict(
+        not against, found.explained >= BARELY, head + "; ".join(clause for clause in clauses if clause)
+    )
 
 
 def _list_objections(found: Findings) -> list[str]:

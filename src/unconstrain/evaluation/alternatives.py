@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 MOST_SAMPLES = 3000
 """More are thinned evenly along episodes: it is to be seen what helps, not by how much exactly."""
 
-HELPS = 0.5
+HELPS = 0.6
 """What is left unexplained has to fall to this share, or else the alternative is not worth its option."""
 
 AS_GOOD = 0.05

@@ -15,7 +15,7 @@ from unconstrain import metrics
 from unconstrain.constraints.nullspace import in_metric
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.evaluation.alternatives import choose_missing, try_alternatives
+from unconstrain.evaluation.alternatives import choose_missing, find_turn, try_alternatives
 from unconstrain.evaluation.contact import Contact, find_contact
 from unconstrain.evaluation.fixed import find_fixed
 from unconstrain.evaluation.following import follow
@@ -216,17 +216,19 @@ def evaluate(
     several = demos.n_episodes > 1
     labels = demos.episode_labels[:most_episodes] if several else ()
     episodes = [score(label, U, P, judge, rows=demos.episodes == code) for code, label in enumerate(labels)]
+    typical = find_typical(U, P, judge, demos)
     nupe = None
     if demos.policy is not None:
         true = policy.scaled(demos.policy)
         nupe = metrics.normalized(metrics.unconstrained_policy_error(true, P), true)
     tried = []
-    if max(total.shown, regression.shown) < WELL:
+    if max(total.shown, regression.shown) < WELL and not typical >= WELL:
         tried = try_alternatives(policy, demos, without=without, progress=progress)
     found = Findings(
         explained=total.shown,
         regression=regression.shown,
         held_out="these recordings",
+        typical=typical,
         free=float(free.mean()) if policy.solution_.belief is not None else None,
         known=share_known(judge),
         is_regression=policy.risk == "direct",
@@ -236,6 +238,7 @@ def evaluate(
         missing=choose_missing(max(total.shown, regression.shown), tried),
         following=follow(policy, demos),
         is_stabilized=policy.stability_ is not None,
+        repeats=demos.time is not None and find_turn(demos) is not None,
     )
     return Evaluation(
         (total, regression, score_still(U, judge)),
@@ -246,6 +249,31 @@ def evaluate(
         nupe,
         tuple(remarks),
     )
+
+
+def find_typical(U: np.ndarray, P: np.ndarray, judge: Judge, demos: Demonstrations) -> float:
+    """Find what is explained of the middle one of the episodes, which one far from all others does not spoil.
+
+    Parameters
+    ----------
+    U, P : ndarray of shape (N, d)
+        Recorded and predicted actions.
+    judge : Judge
+        Says what is shown.
+    demos : Demonstrations
+        That they are of.
+
+    Returns
+    -------
+    float
+        A share; NaN where there is one episode alone.
+    """
+    if demos.n_episodes < 2:
+        return math.nan
+    with np.errstate(over="ignore", invalid="ignore"):
+        missed = np.bincount(demos.episodes, judge.unexplained(U, P))
+        motion = np.bincount(demos.episodes, np.einsum("nd,nd->n", U, U))
+        return float(np.median(1 - missed[motion > 0] / motion[motion > 0])) if motion.any() else math.nan
 
 
 def share_known(judge: Judge) -> float:
@@ -309,6 +337,9 @@ def _describe_noise(policy: Policy, contact: Contact) -> list[str]:
     ]
 
 
+NONSENSE = 10.0
+"""Shares explained that are below this are written without decimals."""
+
 NOISIER = 3.0
 """By how much the noise has to be larger than in the recordings learnt from, for a remark."""
 
@@ -338,7 +369,9 @@ def _as_demonstrations(
 
 def _cells(each: Score) -> tuple[str, ...]:
     def share(value: float) -> str:
-        return "" if math.isnan(value) else f"{value:.2%}"
+        if math.isnan(value):
+            return ""
+        return f"{value:.0%}" if value < -NONSENSE else f"{round(value, 6) + 0.0:.2%}"
 
     return (
         each.name,

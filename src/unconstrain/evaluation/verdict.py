@@ -26,6 +26,8 @@ class Findings:
     explained, regression : float
         Share explained of what held-out recordings show, by the policy and by ordinary regression; NaN where nothing
         moves or it is not known.
+    typical : float
+        The same of the policy, of the middle one of the episodes; NaN where there is one alone.
     held_out : str
         What they are, in words: "held-out episodes", "these recordings".
     free : float or None
@@ -48,11 +50,14 @@ class Findings:
         Where it leads from recorded starts.
     is_stabilized : bool
         Whether the policy is one that ends at its goal.
+    repeats : bool
+        Whether the movement repeats itself, and has no goal.
     """
 
     explained: float
     regression: float
     held_out: str
+    typical: float = math.nan
     free: float | None = None
     known: float = 0.0
     is_regression: bool = False
@@ -63,6 +68,7 @@ class Findings:
     determined: float | None = None
     following: Following | None = None
     is_stabilized: bool = False
+    repeats: bool = False
 
 
 @dataclass(frozen=True)
@@ -143,8 +149,19 @@ def _list_objections(found: Findings) -> list[str]:
     return against
 
 
+def _describe_remedy(found: Findings) -> str:
+    if found.repeats:
+        return "stable_at=cycle keeps it on its cycle"
+    return "stable_at=end makes it end at the goal, where there is one"
+
+
 def _describe_missing(found: Findings) -> str:
     explained, missing = _describe_explained(found), found.missing
+    if found.typical >= WELL:
+        return (
+            f"{explained}, but {found.typical:.1%} of the middle one: some episodes go where no other went, and there "
+            "it is of no use until more is recorded"
+        )
     if missing is not None:
         return f"{explained}, and with {missing.meaning} it would be some {missing.explained:.0%} ({missing.option})"
     if found.tried:

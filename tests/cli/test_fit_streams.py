@@ -58,13 +58,13 @@ def test_other_folders_are_read_as_the_one_learnt_from(run, folder):
 def test_a_folder_is_read_at_once_if_it_fits_into_memory(run, folder, monkeypatch):
     code, out, err = run("fit", folder, *COLUMNS, "--model", "linear")
     assert code == 0, err
-    assert "learnt by" in out
+    assert "verdict: " in out
     at_once = uc.load_policy("policy.skops").predict(X)
     monkeypatch.setattr("unconstrain.recordings.source.available_memory", lambda: 1000.0)
     code, out, err = run("fit", folder, *COLUMNS, "--model", "linear", "--overwrite")
     assert code == 0, err
     assert "held-out log-likelihood of a sample" in out
-    assert "learnt by" not in out
+    assert "verdict: " not in out
     np.testing.assert_allclose(uc.load_policy("policy.skops").predict(X), at_once, atol=1e-9)
 
 
@@ -73,7 +73,7 @@ def test_what_needs_all_data_gets_a_folder_at_once(run, folder, tmp_path):
         "fit", folder, *COLUMNS, "--model", "linear", "--figure", "a.png", "--min-speed", "0.01"
     )
     assert code == 0, err
-    assert "learnt by" in out
+    assert "verdict: " in out
     assert (tmp_path / "a.png").exists()
 
 

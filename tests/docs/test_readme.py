@@ -34,10 +34,14 @@ def printed(tmp_path_factory):
 
 
 def test_the_commands_print_the_shares_that_the_text_states(printed):
-    shares = {name: re.findall(r"([\d.]+)%", output) for name, output in printed[0].items()}
+    (free,) = re.findall(r"inferred: ([\d.]+)%", printed[0]["fit"])
+    shown = {
+        name: re.findall(r"│ (?:adaptive|inconsistency|ordinary|policy).* ([-\d.]+)% +│ +[-\d.]* +│", output)
+        for name, output in printed[0].items()
+    }
     told = [float(share) for share in re.findall(r"([\d.]+) %", FIVE_MINUTES)]
-    found = [float(share) for share in (*shares["fit"][:4], shares["evaluate"][-1])]
-    # What was free, then the shares explained: adaptive, inconsistency, direct, and on the others.
+    found = [float(share) for share in (free, *shown["fit"], shown["evaluate"][0])]
+    # What was free, then the shares explained: adaptive, inconsistency, ordinary regression, and on the others.
     assert found == pytest.approx(told, abs=0.1)
     assert f"noise: {re.search(r'deviation of ([0-9.]+)', FIVE_MINUTES)[1]} in the unit" in printed[0]["fit"]
     assert "x2 0.2" in printed[0]["rollout"]

@@ -14,7 +14,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "states.md").read_text(encoding="ut
 
 def explained(printed: str) -> str:
     """Return the share that the saved policy explains, as the page writes it."""
-    (row,) = re.findall(r"\(saved\).*?([-\d.]+)%", printed)
+    (row,) = re.findall(r"\(saved\).*% .*? ([-\d.]+)%", printed)
     return f"{row} %"
 
 

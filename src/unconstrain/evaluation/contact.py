@@ -36,7 +36,7 @@ class Contact(NamedTuple):
 
 
 def find_contact(policy: Policy, demos: Demonstrations) -> Contact:
-    """Infer which samples were free, with noise as these recordings have it.
+    """Infer which samples were free, with noise as these recordings have it, or as those learnt from if they have less.
 
     Another day's recordings may be noisier than those learnt from. Judged by the noise of those, each of them would
     look constrained, and of a constrained sample little has to be explained.
@@ -67,11 +67,13 @@ def find_contact(policy: Policy, demos: Demonstrations) -> Contact:
         Samples(demos.states, demos.actions, groups=demos.episodes, projections=demos.projections),
     )
     kinds = ("action", "speed") if belief.noise.speed > 0 else ("action",)
-    floor = 1e-14 * max(float(np.mean(samples.actions**2)), np.finfo(np.float64).tiny)
+    learnt = belief.noise
     for _ in range(ROUNDS):
         found = infer(policy.model_, belief, samples)
         noise = found.tally.squares.estimate(kinds)
-        belief = replace(belief, noise=replace(noise, action=max(noise.action, floor)))
+        # With less noise than was learnt from, what the policy itself misses would look constrained.
+        noise = replace(noise, action=max(noise.action, learnt.action), speed=max(noise.speed, learnt.speed))
+        belief = replace(belief, noise=noise)
     found = infer(policy.model_, belief, samples)
     likelihood = found.tally.log_likelihood / found.tally.n_samples
     return Contact(found.free, float(likelihood), float(np.sqrt(belief.noise.action)))

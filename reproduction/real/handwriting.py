@@ -136,7 +136,7 @@ def learn(way: str, demos: Demonstrations, seed: int) -> Callable[[Array], Array
     if way == AUTO:
         policy = select_policy("auto", demos).policy
     else:
-        policy = LocallyLinearPolicy(**({"n_centers": FINE} if way == LOCAL else {})).fit(demos)
+        policy = (LocallyLinearPolicy(n_centers=FINE) if way == LOCAL else LocallyLinearPolicy()).fit(demos)
     return policy.stabilized("end", demos).held_for(DT).predict
 
 

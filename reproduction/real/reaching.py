@@ -148,7 +148,7 @@ def measure(folder: Path, split: int) -> dict[str, Any]:
     X = np.vstack([each[0] for each in tested])
     for name, width in (("model", inferred.width_), ("data", report.reach)):
         near_bent, near_free = (
-            KDTree(demos.states[own] / width).query(X / width)[0] <= 1 for own in (bent, ~bent)
+            np.asarray(KDTree(demos.states[own] / width).query(X / width)[0]) <= 1 for own in (bent, ~bent)
         )
         result |= {
             f"{name} width": float(np.mean(width)),
@@ -185,8 +185,8 @@ def compare(
     -------
     tuple of float
         The error of the whole action, as a share of its variance; the same once the policy goes through each reach with
-        the factor on its speed that suits best; the median angle between velocities, degrees; and how far the policy, made stable
-        at the goal, leads from a reach that it follows from the same start, m (mean over the samples of the reach).
+        the factor on its speed that suits best; the median angle between velocities, degrees; and how far from a reach
+        the policy, made stable at the goal, leads from the same start, m (mean over the reach's samples).
     """
     X, U = (np.vstack([each[i] for each in tested]) for i in (0, 1))
     P = policy.predict(X)
@@ -201,7 +201,7 @@ def compare(
     stable = policy.stabilized("end", demos)
     paths = stable.rollout(np.array([each[0][0] for each in tested]), LONGEST, DT).states
     off = [
-        KDTree(path).query(positions)[0].mean()
+        np.mean(KDTree(path).query(positions)[0])
         for path, (positions, _) in zip(paths.reshape(len(tested), -1, 3), tested, strict=True)
     ]
     return (
@@ -250,11 +250,11 @@ def describe(folder: Path, results: list[dict[str, Any]]) -> tuple[str, ...]:
     free, bent = (np.mean([pairs[i][0][0][0] for i in each]) for each in (FREE_REACHES, BENT_REACHES))
     findings += [
         f"free reaches begin at x = {free:.2f} m and bent ones at {bent:.2f} m on average, on either side of the goal",
-        f"where held-out samples lie, {found['data near bent']:.0%} have a bent sample within {found['data width']:.2f} m "
-        f"(Scott's rule) and {found['data near free']:.0%} a free one: what the policy does there is hardly determined by "
-        f"any of the recordings, but by how the model extends two free reaches",
-        f"receptive fields are {found['model width']:.2f} m wide, and {found['model near bent']:.0%} of held-out samples "
-        "have a bent sample within one: so what happened on the other side of the goal counts",
+        f"of held-out samples {found['data near bent']:.0%} have a bent one within {found['data width']:.2f} m (Scott's "
+        f"rule) and {found['data near free']:.0%} a free one: elsewhere no recording says what the policy does, but how "
+        "the model extends two free reaches",
+        f"receptive fields are {found['model width']:.2f} m wide, and {found['model near bent']:.0%} of held-out "
+        "samples have a bent one within that: what happened on the other side of the goal counts there",
         f"of the policy's directions at recorded states {found['determined']:.0%} are determined by free flags and the "
         "directions of motion (uc.identifiability)",
         f"inference takes {found['free share']:.0%} of all samples for free, and so it is ordinary regression",
@@ -276,13 +276,15 @@ def plot_reaches(folder: Path) -> Figure:
         .states.reshape(len(starts), -1, 3)
         for way in (DIRECT, INFERRED, ALONG, WITHOUT)
     }
-    figure = Figure(figsize=(8, 6.4), layout="constrained")
+    figure = Figure(figsize=(7, 7.4), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
     for panel, (i, j) in zip(panels, ((0, 1), (0, 2)), strict=True):
         for centre, sides in boxes:
-            corner = (centre - sides / 2)[[i, j]]
+            corner = centre - sides / 2
             panel.add_patch(
-                Rectangle(corner, sides[i], sides[j], facecolor="#dddddd", edgecolor=TRUE, lw=0.5)
+                Rectangle(
+                    (corner[i], corner[j]), sides[i], sides[j], facecolor="#dddddd", edgecolor=TRUE, lw=0.5
+                )
             )
         for k, (X, _) in enumerate(pairs):
             style = ("-" if k in shown else ":") if k not in BENT_REACHES else "--"
@@ -293,7 +295,7 @@ def plot_reaches(folder: Path) -> Figure:
                 panel.plot(path[:, i], path[:, j], color=color, lw=width, label=None if k else way)
         panel.plot(*pairs[0][0][-1, [i, j]], "o", color=TRUE, markersize=4)
         panel.set(xlabel="x (m)", ylabel=f"{'xyz'[j]} (m)", aspect="equal")
-    panels[0].legend(fontsize=6, loc="lower right")
+    figure.legend(*panels[0].get_legend_handles_labels(), fontsize=7, loc="outside upper center", ncols=2)
     return figure
 
 
@@ -309,8 +311,9 @@ def _describe_contact(pairs: list[tuple[Array, Array]], boxes: list[tuple[Array,
     ]
     along = np.einsum("dn,nd->n", np.array(slopes), U[near] / np.linalg.norm(U[near], axis=1, keepdims=True))
     return (
-        f"within {WITHIN} m of a box {np.mean(along**2):.0%} of the squared motion is along its surface's normal, and no "
-        f"sample is nearer than {100 * distance.min():.1f} cm: nothing slid along a surface, and N = I - n nᵀ is not true"
+        f"within {WITHIN} m of a box {np.mean(along**2):.0%} of the squared motion is along its surface's normal, and "
+        f"no sample is nearer than {100 * distance.min():.1f} cm: nothing slid along a surface, so N = I - n nᵀ is "
+        "not true"
     )
 
 

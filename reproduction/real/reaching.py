@@ -111,9 +111,9 @@ def learn(way: str, demos: Demonstrations, boxes: list[tuple[Array, Array]], wit
         return LocallyLinearPolicy().fit(demos)
     kept = np.ones(len(demos), dtype=bool)
     if way == WITHOUT:
-        kept = np.isfinite(known).all(axis=(1, 2))
+        kept &= np.isfinite(known[:, 0, 0])
     if way == FREE:
-        kept = demos.episodes >= len(BENT_REACHES)
+        kept &= demos.episodes >= len(BENT_REACHES)
     return LocallyLinearPolicy(risk="direct").fit(
         demos.states[kept], demos.actions[kept], groups=demos.episodes[kept]
     )
@@ -250,9 +250,9 @@ def describe(folder: Path, results: list[dict[str, Any]]) -> tuple[str, ...]:
     free, bent = (np.mean([pairs[i][0][0][0] for i in each]) for each in (FREE_REACHES, BENT_REACHES))
     findings += [
         f"free reaches begin at x = {free:.2f} m and bent ones at {bent:.2f} m on average, on either side of the goal",
-        f"of held-out samples {found['data near bent']:.0%} have a bent one within {found['data width']:.2f} m (Scott's "
-        f"rule) and {found['data near free']:.0%} a free one: elsewhere no recording says what the policy does, but how "
-        "the model extends two free reaches",
+        f"of held-out samples {found['data near bent']:.0%} have a bent one within {found['data width']:.2f} m "
+        f"(Scott's rule) and {found['data near free']:.0%} a free one: elsewhere no recording says what the policy "
+        "does, but how the model extends two free reaches",
         f"receptive fields are {found['model width']:.2f} m wide, and {found['model near bent']:.0%} of held-out "
         "samples have a bent one within that: what happened on the other side of the goal counts there",
         f"of the policy's directions at recorded states {found['determined']:.0%} are determined by free flags and the "

@@ -75,6 +75,17 @@ def test_what_boxes_bend_is_better_left_out(monkeypatch):
     assert all(a < b for a, b in zip(without, direct, strict=True))
 
 
+def test_the_page_has_the_tables_of_what_the_command_prints():
+    page = (ROOT / "docs" / "real.md").read_text(encoding="utf-8")
+    measured = {shape: (1.0, 0.1, 100.0) for shape in ("Angle", "GShape")}
+    results = [{way: {"test": measured, "train": measured} for way in handwriting.EVERY_TIME}]
+    headers = [line for line in handwriting.tabulate(list(measured), results).splitlines() if "RMSE" in line]
+    ways = dict.fromkeys((reaching._name(*each) for each in reaching.list_ways()), (1.0, 1.0, 1.0, 1.0))
+    headers.append(reaching.tabulate([ways]).splitlines()[0])
+    assert len(headers) == 3
+    assert all(header in page for header in headers)
+
+
 def test_a_folder_without_recordings_is_a_mistake(tmp_path, capsys):
     assert run(["real", str(tmp_path)]) == 2
     assert "holds nothing to run" in capsys.readouterr().err

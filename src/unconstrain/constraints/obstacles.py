@@ -21,8 +21,9 @@ def from_obstacles(
     """Make projections from where obstacles are: nothing is in the way of a sample that is far from all of them.
 
     Near an obstacle nothing is known: people go round it without touching it, so no direction is blocked that its
-    surface would tell. Which part of such a motion is the policy's is left to the fit. Where the motion slides along
-    the surface, `from_normals` says more.
+    surface would tell. The fit takes such a motion for free, or for what a constraint left of the policy's. Where
+    people steered round an obstacle it is neither, and leaving out what is not known may be better; where the motion
+    slides along a surface, `from_normals` says more.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ def test_what_boxes_bend_is_better_left_out(monkeypatch):
 
 def test_the_page_has_the_tables_of_what_the_command_prints():
     page = (ROOT / "docs" / "real.md").read_text(encoding="utf-8")
-    measured = {shape: (1.0, 0.1, 100.0) for shape in ("Angle", "GShape")}
+    measured = dict.fromkeys(("Angle", "GShape"), (1.0, 0.1, 100.0))
     results = [{way: {"test": measured, "train": measured} for way in handwriting.EVERY_TIME}]
     headers = [line for line in handwriting.tabulate(list(measured), results).splitlines() if "RMSE" in line]
     ways = dict.fromkeys((reaching._name(*each) for each in reaching.list_ways()), (1.0, 1.0, 1.0, 1.0))

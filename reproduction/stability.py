@@ -258,7 +258,7 @@ class _Learnt:
 def _learn(folder: Path, shape: str, repetition: int) -> _Learnt:
     path = folder / "handwriting" / f"{shape}.mat"
     pairs = load_demonstrations(path, "demos", transposed=True)
-    times = _load_times(path)
+    times = load_times(path)
     order = np.random.default_rng(repetition).permutation(len(pairs))
     train, held_out = (join([pairs[i] for i in which]) for which in (order[:SHOWN], order[SHOWN:]))
     train = replace(train, time=np.concatenate([times[i] for i in order[:SHOWN]]))
@@ -288,7 +288,8 @@ def _end(policy: Policy, starts: np.ndarray, steps: int, size: float) -> np.ndar
     return np.linalg.norm(X, axis=1)
 
 
-def _load_times(path: Path) -> list[np.ndarray]:
+def load_times(path: Path) -> list[np.ndarray]:
+    """Load the times of every demonstration in a file of handwriting, s."""
     from scipy.io import loadmat
 
     return [np.asarray(one["t"], dtype=np.float64) for one in loadmat(path, simplify_cells=True)["demos"]]

@@ -3,10 +3,10 @@
 A constraint says which directions of action are impossible: the rows of ``A`` satisfy ``A u = 0``. What is
 left of a policy under it is ``u = N π(x)``, with ``N = I - A⁺A`` the projection onto the nullspace of ``A``.
 
-`projection` takes the rows themselves; `from_normals`, `from_jacobian`, `from_forces` and `from_flags` start from what
-is measured. Where a sample's constraint is not known its projection is all NaN, and ``policy.fit(X, U,
-projections=N)`` learns from that sample what its direction of motion says. Constraints that are found in the actions
-themselves are in `unconstrain.constraints.learnt`.
+`projection` takes the rows themselves; `from_normals`, `from_jacobian`, `from_forces`, `from_flags` and
+`from_obstacles` start from what is measured. Where a sample's constraint is not known its projection is all NaN, and
+``policy.fit(X, U, projections=N)`` learns from that sample what its direction of motion says. Constraints that are
+found in the actions themselves are in `unconstrain.constraints.learnt`.
 """
 
 from unconstrain.constraints.contacts import contact
@@ -19,6 +19,7 @@ from unconstrain.constraints.nullspace import (
     projection,
     unconstrained,
 )
+from unconstrain.constraints.obstacles import from_obstacles, obstacle_distances
 from unconstrain.constraints.recorded import from_recording
 
 __all__ = [
@@ -31,7 +32,9 @@ __all__ = [
     "from_forces",
     "from_jacobian",
     "from_normals",
+    "from_obstacles",
     "from_recording",
+    "obstacle_distances",
     "projection",
     "unconstrained",
 ]

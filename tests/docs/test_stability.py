@@ -24,7 +24,7 @@ def test_the_commands_print_what_the_page_says(tmp_path, capsys):
             assert run(shlex.split(command)[1:]) == 0
             printed += capsys.readouterr().out
         fit = commands.splitlines()[0].replace("--stable-at end ", "").replace("reach.skops", "plain.skops")
-        for command in (fit, 'unconstrain rollout plain.skops --start="-0.5,-0.3" --overwrite'):
+        for command in (fit, 'unconstrain rollout plain.skops --start="-0.5,-0.3" --beyond anywhere --overwrite'):
             assert run(shlex.split(command)[1:]) == 0
         plain = np.genfromtxt("rollout.csv", delimiter=",", names=True)
     said = [

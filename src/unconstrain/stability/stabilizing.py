@@ -1,6 +1,6 @@
 """The smallest change of an action that makes a Lyapunov function fall, in closed form."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -138,6 +138,21 @@ class Stability:
         lyapunov = learn_lyapunov(E, U, wanted, space.blocks)
         extent = float(np.linalg.norm(np.ptp(E, axis=0)))
         return cls(space, goal, scale, lyapunov, pace, radius, pull, extent, hold)
+
+    def held_for(self, seconds: float) -> Self:
+        """Return this for actions that are held for a time, where that is longer.
+
+        Parameters
+        ----------
+        seconds : float
+            Above zero.
+
+        Returns
+        -------
+        Stability
+            For at least that long.
+        """
+        return self if seconds <= self.hold else replace(self, hold=seconds)
 
     def stabilize(self, X: Array, U: Array, projections: Array | None = None) -> Array:
         """Change actions as little as it takes to make V fall.

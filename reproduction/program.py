@@ -239,7 +239,25 @@ def stability(data: Path, repetitions: int, shape: tuple[str, ...], figure: Path
         console.print(f"written: {figure}", soft_wrap=True)
 
 
+@click.command("cycles", cls=Command)
+@click.argument("data", type=PATH, metavar="DATA_FOLDER")
+def cycles(data: Path) -> None:
+    """Follow movements that go round and round for ten periods, plain and kept on a cycle.
+
+    DATA_FOLDER holds planer_circle.csv, curve_circle.csv and wiping/*.mat.
+    """
+    from reproduction.cycles import measure_all, tabulate
+
+    console = _console()
+    with console.status("learning"):
+        rows, refused = measure_all(data)
+    console.print(tabulate(rows), soft_wrap=True)
+    for sentence in refused:
+        console.print(sentence, soft_wrap=True)
+
+
 program.add_command(run_all)
+program.add_command(cycles)
 program.add_command(stability)
 program.add_command(view)
 

@@ -251,7 +251,7 @@ def simulate(
                 _check_velocities(space, x, u)
             else:
                 following, u = advance(x, u)
-            finite = np.isfinite(u).all(axis=1)
+            finite: NDArray[np.bool_] = np.isfinite(u).all(axis=1)
             if not finite[going].all() and (k == 0 or advance is not None):
                 raise UnconstrainError(
                     f"the actions are not finite at step {k} of {steps} ({k * dt:g} s): use a smaller time step dt, or "
@@ -274,7 +274,7 @@ def simulate(
             halt(_find_reasons(guards, following, going), k)
             x = np.where(going[:, None], following, x)
 
-    kept = np.arange(k + 1) < ends[:, None]
+    kept: NDArray[np.bool_] = np.arange(k + 1) < ends[:, None]
     names = _names(policy, x.shape[1]) if state_names is None else tuple(state_names)
     stops.sort(key=lambda stop: stop.episode)
     _warn(stops, steps, names, len(x))
@@ -294,7 +294,7 @@ def simulate(
 
 def _find_reasons(guards: Sequence[Guard], X: Array, going: NDArray[np.bool_]) -> list[str]:
     """Return why each movement may not be in its state (S, n), empty where it may or has ended."""
-    finite = np.isfinite(X).all(axis=1)
+    finite: NDArray[np.bool_] = np.isfinite(X).all(axis=1)
     reasons = ["" if good else OUT_OF_BOUNDS for good in finite]
     rows = np.flatnonzero(finite & going)
     for guard in guards if len(rows) else ():

@@ -105,8 +105,8 @@ class Recorded:
             return f"the movement diverges: it leads {away:.3g} {unit} away from all recorded states"
         if away > self.beyond:
             return (
-                f"the movement leaves what was recorded: it leads {away:.3g} {unit} away from all recorded states, and "
-                f"{self.beyond:g} are allowed; say with beyond= how far it may lead, or that it may lead anywhere"
+                f"the movement leaves what was recorded: it leads {away:.4g} {unit} away from all recorded states, "
+                f"more than {self.beyond:g}; say with beyond= how far it may lead, or that it may lead anywhere"
             )
         return ""
 

@@ -144,8 +144,8 @@ class Cycle:
         curve[:, 0] *= np.sqrt(np.mean(rho**2) / np.mean((B @ curve[:, 0]) ** 2))
         seconds = float(np.sum(np.diff(time)[follows]))
         # Samples are even in time, so the share of them at a phase is the time that it takes.
-        slowness = np.mean(B, axis=0) * np.append(1.0, np.full(2 * HARMONICS, 2.0))
-        slowness *= seconds / abs(turns) / (2 * np.pi)
+        means = np.asarray(np.mean(B, axis=0), dtype=np.float64)
+        slowness = means * np.append(1.0, np.full(2 * HARMONICS, 2.0)) * (seconds / abs(turns) / (2 * np.pi))
         extent = float(np.linalg.norm(np.ptp(E, axis=0)))
         cycle = cls(space, center, scale, axes, curve, slowness, extent, hold)
         cycle.check_hold()

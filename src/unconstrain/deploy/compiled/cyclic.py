@@ -65,8 +65,9 @@ class Cyclic(CompiledPolicy):
         hold, extent = float(about["hold"]), float(about["extent"])
         if not (0 < hold < np.inf and 0 < extent < np.inf):
             raise PolicyError("the numbers of a policy on a cycle must be positive and finite")
-        own = {name: arrays[key] for name, key in zip(CYCLE_NAMES, CYCLE_ARRAYS, strict=True)}
-        return cls(step, Cycle(from_description(about["space"]), **own, extent=extent, hold=hold))
+        center, scale, axes, curve, slowness = (arrays[name] for name in CYCLE_ARRAYS)
+        space = from_description(about["space"])
+        return cls(step, Cycle(space, center, scale, axes, curve, slowness, extent, hold))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.step, self.cycle)

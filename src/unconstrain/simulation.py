@@ -17,7 +17,6 @@ from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.memory import check_memory
 from unconstrain.spaces import Numbers, Space
 from unconstrain.stopping import (
-    BEYOND,
     OUT_OF_BOUNDS,
     Guard,
     Limits,
@@ -63,7 +62,7 @@ def rollout(
     constraint: Constraint | None = None,
     *,
     stop_when: StopWhen | None = None,
-    beyond: float = BEYOND,
+    beyond: float | None = None,
     limits: Any = None,
 ) -> Movement:
     """Integrate a policy whose actions are velocities of its state: ``x_{k+1} = x_k + dt N(x_k) π(x_k)``.
@@ -91,9 +90,10 @@ def rollout(
         policy moves freely.
     stop_when : callable, optional
         Is given the current states (S, n). Each movement ends at its first state for which it returns true.
-    beyond : float
-        How far from recorded states a movement may lead, in the policy's `distance_unit_`; infinite for anywhere,
-        unless it diverges. Functions, and policies of others, do not know what was recorded.
+    beyond : float, optional
+        How far from recorded states a movement may lead, in the policy's `distance_unit_`; by default as far as
+        recordings lead from each other (`Policy.usual_distance`), infinite for anywhere, unless it diverges. Functions,
+        and policies of others, do not know what was recorded.
     limits : sequence of n pairs, or mapping from str to pairs, optional
         The least and the largest value that each state may have, as those of joints, None where there is none; or by
         the names of the states, {"elbow": (-1.5, 1.5)}.
@@ -132,7 +132,7 @@ def rollout(
         held = limits if isinstance(limits, Limits) else Limits(limits, _names(policy, x.shape[1]))
         check_inside(held, x)
         guards.append(held)
-    if hasattr(policy, "distance") and getattr(policy, "stability_", None) is None:
+    if hasattr(policy, "usual_distance") and getattr(policy, "stability_", None) is None:
         guards.append(Recorded(policy, beyond))
     if constraint is None:
         return simulate(policy, start, steps, dt, stop_when=stop_when, guards=guards)
@@ -251,7 +251,7 @@ def simulate(
                 _check_velocities(space, x, u)
             else:
                 following, u = advance(x, u)
-            finite: NDArray[np.bool_] = np.isfinite(u).all(axis=1)
+            finite = np.asarray(np.isfinite(u).all(axis=1))
             if not finite[going].all() and (k == 0 or advance is not None):
                 raise UnconstrainError(
                     f"the actions are not finite at step {k} of {steps} ({k * dt:g} s): use a smaller time step dt, or "
@@ -294,7 +294,7 @@ def simulate(
 
 def _find_reasons(guards: Sequence[Guard], X: Array, going: NDArray[np.bool_]) -> list[str]:
     """Return why each movement may not be in its state (S, n), empty where it may or has ended."""
-    finite: NDArray[np.bool_] = np.isfinite(X).all(axis=1)
+    finite = np.asarray(np.isfinite(X).all(axis=1))
     reasons = ["" if good else OUT_OF_BOUNDS for good in finite]
     rows = np.flatnonzero(finite & going)
     for guard in guards if len(rows) else ():

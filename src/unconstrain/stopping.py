@@ -16,9 +16,6 @@ Array = NDArray[np.float64]
 Guard = Callable[[Array], list[str]]
 """From states (S, n) to the reason why a movement may not be in each, empty where it may."""
 
-BEYOND = 1.0
-"""How far from what was recorded a movement may lead, in the unit of the policy's `distance`."""
-
 DIVERGED = 100.0
 """How many times as far as recorded states lie from each other a movement leads that diverges."""
 
@@ -56,10 +53,12 @@ class Movement(Demonstrations):
 
     Parameters
     ----------
-    *args, **kwargs
+    *args
         As for `Demonstrations`.
     stopped : sequence of Stop
         Of those that were cut short. Empty where all of them took all steps, or ended where they were told to.
+    **kwargs
+        As for `Demonstrations`.
     """
 
     stopped: tuple[Stop, ...]
@@ -78,11 +77,11 @@ class Recorded:
 
     Parameters
     ----------
-    policy : object with ``distance(X)``
-        A policy of this library.
-    beyond : float
-        How far from recorded states they may lead, in the policy's `distance_unit_`; infinite for as far as they like
-        unless they diverge.
+    policy : Policy
+        Of this library.
+    beyond : float, optional
+        How far from recorded states they may lead, in the policy's `distance_unit_`; by default as far as recordings
+        lead from each other, infinite for as far as they like unless they diverge.
 
     Raises
     ------
@@ -90,23 +89,25 @@ class Recorded:
         `beyond` is no number above zero.
     """
 
-    def __init__(self, policy: Any, beyond: float = BEYOND) -> None:
-        self.policy = policy
+    def __init__(self, policy: Any, beyond: float | None = None) -> None:
+        self.unit, self.lay_out, self.region = policy.distance_unit_, policy.model_.lay_out, policy.region()
+        beyond = policy.usual_distance() if beyond is None else beyond
         self.beyond = np.inf if beyond == np.inf else check_number(beyond, "beyond", positive=True)
-        self.diverged = max(DIVERGED * policy.solution_.region.extent, self.beyond)
+        farthest = DIVERGED * self.region.extent
+        self.diverged = farthest if self.beyond == np.inf else max(farthest, self.beyond)
 
     def __call__(self, X: Array) -> list[str]:
         """Say why a movement may not be in states (S, n)."""
-        return [self._reason(away) for away in self.policy.distance(X)]
+        return [self._reason(away) for away in self.region.distance(self.lay_out(X))]
 
     def _reason(self, away: float) -> str:
-        unit = self.policy.distance_unit_
+        unit = self.unit
         if away > self.diverged:
             return f"the movement diverges: it leads {away:.3g} {unit} away from all recorded states"
         if away > self.beyond:
             return (
                 f"the movement leaves what was recorded: it leads {away:.4g} {unit} away from all recorded states, "
-                f"more than {self.beyond:g}; say with beyond= how far it may lead, or that it may lead anywhere"
+                f"more than {self.beyond:.4g}; say with beyond= how far it may lead, or that it may lead anywhere"
             )
         return ""
 

@@ -72,10 +72,9 @@ if TYPE_CHECKING:
 @click.option(
     "--beyond",
     type=Number(words=(ANYWHERE,)),
-    default=1.0,
-    show_default=True,
     help="How far from recorded states the movement may lead before it stops, in widths of receptive fields (without "
-    f'these in half-spreads of the states), or "{ANYWHERE}". A stable policy may lead anywhere, since it comes back.',
+    f'these in half-spreads of the states), or "{ANYWHERE}"; by default as far as recordings lead from each other, at '
+    "least 1. A stable policy may lead anywhere, since it comes back.",
 )
 @click.option(
     "--limits",
@@ -95,7 +94,7 @@ def rollout(
     goal: list[float] | None,
     stable_at: list[float] | str | None,
     stop_when_unsure: float | None,
-    beyond: float | str,
+    beyond: float | str | None,
     limits: Any,
     out: Path,
     figure: Path,
@@ -139,7 +138,7 @@ def rollout(
         movement = integrate(
             *(learnt, begin, steps, dt, rows if len(rows) else None),
             stop_when=unsure,
-            beyond=math.inf if beyond == ANYWHERE else float(beyond),
+            beyond=math.inf if isinstance(beyond, str) else beyond,
             limits=held,
         )
     taken = len(movement) - 1

@@ -62,8 +62,8 @@ class Solution:
         How many independent samples one is worth, by its residuals.
     record : Record
         How that was found.
-    region : Region, optional
-        Where the samples lie.
+    regions : tuple of Region or None
+        By fold: where the samples lie.
     noise, residual : float
         For "corrected": variance of the noise, and of what one sample shows about the policy (`Correction.residual`),
         in squared units of the action; else NaN.
@@ -82,7 +82,7 @@ class Solution:
     free_share: float = math.nan
     evidence: float = 1.0
     record: "Record" = field(default_factory=lambda: Record())
-    region: Region | None = None
+    regions: tuple[Region | None, ...] = ()
     noise: float = math.nan
     residual: float = math.nan
     doubt: str = ""
@@ -245,7 +245,7 @@ class Accumulator:
             n_zero=len(U) - int(np.count_nonzero(moves)),
             n_known=0 if samples.projections is None else int(np.sum(~unknown(samples.projections))),
             longest=longest,
-            region=self._find_region(samples),
+            regions=self._find_regions(samples, fold),
         )
         if self.risk == "adaptive" and samples.weights is not None and not samples.weights.all():
             # Left out here, so that they do not speak for their neighbours either.
@@ -460,7 +460,7 @@ class Accumulator:
     ) -> Solution:
         total, parameters = self.total, self.model.parameters(w)
         counts = (total.n_samples, total.n_zero, total.n_known)
-        solution = Solution(parameters, alpha, alphas, held_out_risk, *counts, region=total.region)
+        solution = Solution(parameters, alpha, alphas, held_out_risk, *counts, regions=total.regions)
         if self.belief is None:
             return solution
         states = total.tallies[0].counts.states
@@ -472,14 +472,19 @@ class Accumulator:
             record=self.record,
         )
 
-    def _find_region(self, samples: Samples) -> Region | None:
+    def _find_regions(self, samples: Samples, fold: np.ndarray | None) -> tuple[Region | None, ...]:
         if not self.finds_region or self.unit is None:
-            return None
-        X = samples.states if samples.weights is None else samples.states[samples.weights > 0]
-        if not len(X):
-            return None
-        known = self.total.region
-        return Region.of(self.model.lay_out(X), self.unit, 0 if known is None else known.coarseness)
+            return ()
+        counts = np.ones(len(samples.states), dtype=bool) if samples.weights is None else samples.weights > 0
+        Z, unit, known = self.model.lay_out(samples.states), self.unit, self.total.regions
+
+        def find(rows: np.ndarray, k: int) -> Region:
+            before = known[k] if k < len(known) else None
+            return Region.of(Z[rows], unit, 0 if before is None else before.coarseness)
+
+        numbers = [0] if fold is None else range(1 + int(fold.max(initial=0)))
+        inside = [counts if fold is None else counts & (fold == k) for k in numbers]
+        return tuple(find(rows, k) if rows.any() else None for k, rows in enumerate(inside))
 
     def _folds(self, without: int | None) -> list[Any]:
         folds = [part for k, part in enumerate(self.total.moments) if part is not None and k != without]

@@ -5,6 +5,7 @@ stream, of several machines, or of samples that come later, are those of all sam
 are made coarser, eight boxes into one in three dimensions, until they are few.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ OF_SPREAD = 0.5
 FINEST = 0.25
 """Edge of the smallest boxes, in units of the region."""
 
-MOST_BOXES = 1024
+MOST_BOXES = 512
 """Beyond so many, boxes become coarser."""
 
 LARGEST = 2.0**62
@@ -140,6 +141,45 @@ def find_unit(Z: Array, width: float | Array | None) -> Array:
     if width is not None:
         return np.array(np.broadcast_to(width, Z.shape[1]), dtype=np.float64)
     return OF_SPREAD * np.sqrt(Z.shape[1]) * Scaling.of(Z).spread
+
+
+def unite(regions: Sequence[Region | None]) -> Region:
+    """Add regions up.
+
+    Parameters
+    ----------
+    regions : sequence of Region or None
+        Some of them.
+
+    Returns
+    -------
+    Region
+        All boxes, at most as many as one may have.
+    """
+    present = [each for each in regions if each is not None]
+    return sum(present[1:], present[0])
+
+
+def find_apart(regions: Sequence[Region | None]) -> float:
+    """Find how far recordings lead from each other.
+
+    Parameters
+    ----------
+    regions : sequence of Region or None
+        By fold.
+
+    Returns
+    -------
+    float
+        Half of the folds lead farther than this from all others, in units; zero where there is one.
+    """
+    present = [each for each in regions if each is not None]
+    if len(present) < 2:
+        return 0.0
+    others = [unite(present[:k] + present[k + 1 :]) for k in range(len(present))]
+    return float(
+        np.median([other.distance(own.middles).max() for own, other in zip(present, others, strict=True)])
+    )
 
 
 def _shift(coarseness: int) -> int:

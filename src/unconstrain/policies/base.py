@@ -33,7 +33,7 @@ from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS, Observation, observe
 from unconstrain.fitting.posterior import Posterior
-from unconstrain.fitting.region import find_unit
+from unconstrain.fitting.region import Region, find_apart, find_unit, unite
 from unconstrain.motion import moving
 from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
@@ -533,9 +533,30 @@ class Policy(RegressorMixin, BaseEstimator):
             The states are not finite or not of the dimension learnt.
         """
         check_is_fitted(self)
-        region = self.solution_.region
-        assert region is not None
-        return region.distance(self.model_.lay_out(check_states(self, X)))
+        return self.region().distance(self.model_.lay_out(check_states(self, X)))
+
+    def region(self) -> Region:
+        """Return where the states that were learnt from lie, as features see them.
+
+        Returns
+        -------
+        Region
+            At most 512 boxes.
+        """
+        check_is_fitted(self)
+        return unite(self.solution_.regions)
+
+    def usual_distance(self) -> float:
+        """Compute how far a movement may lead from recorded states until it leaves what was recorded.
+
+        Returns
+        -------
+        float
+            As far as recordings lead from each other: half of the folds of `alpha="cv"` lead farther from all others.
+            At least one, in `distance_unit_`.
+        """
+        check_is_fitted(self)
+        return max(1.0, find_apart(self.solution_.regions))
 
     def usual_speed(self) -> float:
         """Compute the root mean square length of the actions learnt from, in units of `scale_`.
@@ -665,7 +686,7 @@ class Policy(RegressorMixin, BaseEstimator):
         constraint: Any = None,
         *,
         stop_when: Callable[[np.ndarray], ArrayLike] | None = None,
-        beyond: float = 1.0,
+        beyond: float | None = None,
         limits: Any = None,
     ) -> "Movement":
         """Follow the policy through time, freely or under a constraint; see `simulation.rollout`.
@@ -682,9 +703,9 @@ class Policy(RegressorMixin, BaseEstimator):
             Rows `A` with `A u = 0`, or a function that returns them for states (S, n).
         stop_when : callable, optional
             Is given the current states (S, n); where it says true a movement ends.
-        beyond : float
-            How far from recorded states a movement may lead before it is stopped, in `distance_unit_`; infinite for
-            anywhere. A stabilised policy may lead anywhere, since it leads back.
+        beyond : float, optional
+            How far from recorded states a movement may lead before it is stopped, in `distance_unit_`; by default
+            `usual_distance`, infinite for anywhere. A stabilised policy may lead anywhere, since it leads back.
         limits : sequence of n pairs, or mapping from str to pairs, optional
             The least and the largest value that each state may have, or by name of those that have limits.
 

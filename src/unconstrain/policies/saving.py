@@ -70,6 +70,6 @@ def _check_usable(policy: Policy) -> None:
         raise TypeError(f"its actions have shape {actions.shape}")
     if not np.isfinite(actions).all():
         raise ValueError("its actions are not finite")
-    if not isinstance(policy.solution_.region, Region):
+    if not any(isinstance(each, Region) for each in policy.solution_.regions):
         raise TypeError("it does not say where it was recorded")
     policy.distance(policy.space_.origin[None])  # raises for the region of another space

@@ -44,10 +44,10 @@ class Unsure:
         Returns
         -------
         bool
-            Whether the policy is not known well enough at the start, which was recorded: then it counts as known
-            where it is known as well as there.
+            Whether the policy is not known well enough at the start, which lies where people were: then it counts as
+            known where it is known as well as there.
         """
-        if not self(start[None])[0] or self.policy.distance(start[None])[0] > 0:
+        if not self(start[None])[0] or self.policy.distance(start[None])[0] > self.policy.usual_distance():
             return False
         self.least = float(self.measure(start[None])[0][0]) * (1 + ROUNDING)
         return True

@@ -139,13 +139,16 @@ class Cycle:
             axes = axes * np.where(np.arange(d) == 1, -1.0, 1.0)[:, None]
             theta = -theta
         B = _fourier(theta, 2 * HARMONICS + 1)
-        curve = np.linalg.lstsq(B, np.column_stack([rho, across]), rcond=None)[0]
+        curve: Array = np.linalg.lstsq(B, np.column_stack([rho, across]), rcond=None)[0]
         # The mean radius of uneven turns is less than how far they usually are from their middle.
         curve[:, 0] *= np.sqrt(np.mean(rho**2) / np.mean((B @ curve[:, 0]) ** 2))
         seconds = float(np.sum(np.diff(time)[follows]))
         # Samples are even in time, so the share of them at a phase is the time that it takes.
-        means = np.asarray(np.mean(B, axis=0), dtype=np.float64)
-        slowness = means * np.append(1.0, np.full(2 * HARMONICS, 2.0)) * (seconds / abs(turns) / (2 * np.pi))
+        slowness: Array = (
+            np.mean(B, axis=0)
+            * np.append(1.0, np.full(2 * HARMONICS, 2.0))
+            * (seconds / abs(turns) / (2 * np.pi))
+        )
         extent = float(np.linalg.norm(np.ptp(E, axis=0)))
         cycle = cls(space, center, scale, axes, curve, slowness, extent, hold)
         cycle.check_hold()

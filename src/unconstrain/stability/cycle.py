@@ -139,16 +139,15 @@ class Cycle:
             axes = axes * np.where(np.arange(d) == 1, -1.0, 1.0)[:, None]
             theta = -theta
         B = _fourier(theta, 2 * HARMONICS + 1)
-        curve: Array = np.linalg.lstsq(B, np.column_stack([rho, across]), rcond=None)[0]
+        curve = np.asarray(
+            np.linalg.lstsq(B, np.column_stack([rho, across]), rcond=None)[0], dtype=np.float64
+        )
         # The mean radius of uneven turns is less than how far they usually are from their middle.
         curve[:, 0] *= np.sqrt(np.mean(rho**2) / np.mean((B @ curve[:, 0]) ** 2))
         seconds = float(np.sum(np.diff(time)[follows]))
         # Samples are even in time, so the share of them at a phase is the time that it takes.
-        slowness: Array = (
-            np.mean(B, axis=0)
-            * np.append(1.0, np.full(2 * HARMONICS, 2.0))
-            * (seconds / abs(turns) / (2 * np.pi))
-        )
+        per_turn = seconds / abs(turns) / (2 * np.pi)
+        slowness: Array = B.mean(axis=0) * np.append(1.0, np.full(2 * HARMONICS, 2.0)) * per_turn
         extent = float(np.linalg.norm(np.ptp(E, axis=0)))
         cycle = cls(space, center, scale, axes, curve, slowness, extent, hold)
         cycle.check_hold()

@@ -7,6 +7,7 @@ are made coarser, eight boxes into one in three dimensions, until they are few.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +41,13 @@ class Region:
     unit : ndarray of shape (m,)
         Along each dimension of the states as features see them: what distances are counted in.
     boxes : ndarray of shape (M, m)
-        Whole numbers, in order.
+        Whole numbers, in order, of a type no larger than they need: files hold them.
     coarseness : int
         How often two boxes along each dimension became one. So the edge is `FINEST 2^coarseness` units.
     """
 
     unit: Array
-    boxes: Array
+    boxes: NDArray[Any]
     coarseness: int = 0
 
     @classmethod
@@ -105,7 +106,7 @@ class Region:
     @property
     def extent(self) -> float:
         """Diagonal of what holds all boxes, in units."""
-        return float(np.linalg.norm((np.ptp(self.boxes, axis=0) + 1.0) * self._edge))
+        return float(np.linalg.norm(np.ptp(self._middles, axis=0) + self._edge))
 
     @property
     def middles(self) -> Array:
@@ -187,18 +188,23 @@ def _shift(coarseness: int) -> int:
     return 1 - coarseness % 2
 
 
-def _coarser(boxes: Array, coarseness: int, wanted: int) -> Array:
+def _coarser(boxes: NDArray[Any], coarseness: int, wanted: int) -> Array:
+    boxes = boxes.astype(np.float64)
     for level in range(coarseness, wanted):
         boxes = np.floor((boxes + _shift(level)) / 2.0)
     return boxes
 
 
-def _as_few(boxes: Array, coarseness: int) -> tuple[Array, int]:
+def _as_few(boxes: Array, coarseness: int) -> tuple[NDArray[Any], int]:
     """Make boxes distinct, in order, and coarser until they are few."""
     boxes = _distinct(boxes)
     while len(boxes) > MOST_BOXES:
         boxes, coarseness = _distinct(_coarser(boxes, coarseness, coarseness + 1)), coarseness + 1
-    return boxes[np.lexsort(boxes.T)], coarseness
+    boxes = boxes[np.lexsort(boxes.T)]
+    largest = float(np.abs(boxes).max(initial=0.0))
+    kinds: tuple[type, ...] = (np.int8, np.int16, np.int32)
+    kind = next((each for each in kinds if largest < np.iinfo(each).max), np.float64)
+    return boxes.astype(kind), coarseness
 
 
 def _distinct(boxes: Array) -> Array:

@@ -1,5 +1,6 @@
 """Compiled policies that go round and round."""
 
+from math import atan2, cos, exp, hypot, pi, remainder, sin, sqrt
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -10,6 +11,7 @@ from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.errors import PolicyError
 from unconstrain.spaces import from_description
 from unconstrain.stability import Cycle
+from unconstrain.stability.cycle import APPROACH, LEAST, TEMPO
 
 CYCLE_NAMES = ("center", "scale", "axes", "curve", "slowness")
 CYCLE_ARRAYS = tuple(f"cycle_{name}" for name in CYCLE_NAMES)
@@ -76,7 +78,8 @@ class Cyclic(CompiledPolicy):
         """Act; see `CompiledPolicy`."""
         if type(x) is not ndarray or x.shape != self._shape:
             return self._otherwise(x, out)
-        actions = self.cycle.stabilize(x[None], self.step(x, out)[None])[0]
+        own = self.step(x, out)
+        actions = self._single(x, own) if self._parts else self.cycle.stabilize(x[None], own[None])[0]
         if out is None:
             return actions
         out[:] = actions
@@ -114,6 +117,51 @@ class Cyclic(CompiledPolicy):
         if not fits:
             raise PolicyError("the cycle of a policy does not go with its states and actions")
         return n, d
+
+    def _prepare(self, arrays: dict[str, ndarray]) -> tuple[Any, ...]:
+        """Lay out what one state needs, where states are plain numbers."""
+        cycle = self.cycle
+        if not cycle.space.is_flat:
+            return ()
+        both = np.column_stack([arrays["curve"], arrays["slowness"]])
+        decay = exp(-APPROACH * cycle.hold / cycle.period)
+        return arrays["center"].copy(), arrays["scale"].copy(), arrays["axes"].copy(), both, cycle.hold, decay
+
+    def _single(self, x: ndarray, own: ndarray) -> ndarray:
+        """Change one action (d,), as `Cycle.stabilize` does many."""
+        center, scale, axes, both, hold, decay = self._parts
+        mean, slowest = both[0, 0], LEAST * both[0, -1]
+
+        def look_up(theta: float) -> ndarray:
+            """Return the radius, what lies across the plane, and the slowness, at a phase."""
+            terms = [1.0]
+            for k in range(1, len(both) // 2 + 1):
+                terms += (cos(k * theta), sin(k * theta))
+            found: ndarray = np.array(terms).dot(both)
+            found[0] = max(found[0], LEAST * mean)
+            found[-1] = max(found[-1], slowest)
+            return found
+
+        at = axes.dot((x - center) / scale)
+        ahead = at + axes.dot(own / scale) * hold
+        theta, then = atan2(at[1], at[0]), atan2(ahead[1], ahead[0])
+        here, there = look_up(theta), look_up(then)
+        usual = hold / look_up(theta + 0.5 * hold / here[-1])[-1]
+        wanted = remainder(then - theta, 2 * pi)
+        step = min(max(wanted, (1 - TEMPO) * usual), (1 + TEMPO) * usual)
+        now, after = at[1:] - here[:-1], ahead[1:] - there[:-1]
+        now[0] = mean * (hypot(at[0], at[1]) / here[0] - 1.0)
+        after[0] = mean * (hypot(ahead[0], ahead[1]) / there[0] - 1.0)
+        allowed, length = decay * sqrt(now.dot(now)), sqrt(after.dot(after))
+        if step == wanted and length <= allowed:
+            return own
+        if length > allowed:
+            after *= allowed / length
+        target = look_up(theta + step)
+        rho = target[0] * max(1.0 + after[0] / mean, 0.0)
+        end = np.concatenate([[rho * cos(theta + step), rho * sin(theta + step)], target[1:-1] + after[1:]])
+        changed: ndarray = (end - at).dot(axes) * scale / hold
+        return changed
 
     def _many(self, X: ndarray) -> ndarray:
         return self.cycle.stabilize(X, self.step(X))

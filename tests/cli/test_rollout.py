@@ -84,6 +84,23 @@ def test_a_movement_that_has_to_stop_is_kept_up_to_there(run, tmp_path):
     assert (tmp_path / "rollout.png").stat().st_size > 0
 
 
+def test_the_limits_of_a_robot_are_those_of_its_joints(run, policy):
+    pytest.importorskip("mujoco")
+    joint = '<joint name="{}" type="hinge" limited="true" range="-0.5 0.11"/><geom size="0.1"/>'
+    body = f"<body>{joint.format('x1')}<body>{joint.format('x2')}</body></body>"
+    head = '<mujoco><compiler angle="radian"/><worldbody>'
+    for name, text in (("named.xml", body), ("other.xml", body.replace("x1", "q1").replace("x2", "q2"))):
+        with open(name, "w") as file:
+            file.write(f"{head}{text}</worldbody></mujoco>")
+        move = ("--start", "0.1,0.1", "--beyond", "anywhere", "--overwrite", "--limits", name)
+        code, out, err = run("rollout", policy, *move)
+        assert code == 3, err
+        assert "its upper limit is 0.11" in out
+        assert ("note: limits are taken in the order of the joints, so x1 is q1" in out) == (
+            name == "other.xml"
+        )
+
+
 def test_a_policy_that_is_relative_to_its_goal_is_told_where_that_is(run, tmp_path):
     t = np.arange(0, 4, 0.02)
     rows = []

@@ -56,7 +56,7 @@ def test_a_cycle_is_compiled_and_saved_like_the_rest(tmp_path):
     X = demos.states[:50]
     np.testing.assert_array_equal(uc.load_policy(tmp_path / "round.skops").predict(X), stable.predict(X))
     np.testing.assert_array_equal(uc.load_compiled(tmp_path / "round.npz")(X), step(X))
-    far = np.concatenate([X + [0.0, 0.7, -0.4], 20 * X])
+    far = np.concatenate([X + np.array([0.0, 0.7, -0.4]), 20 * X])
     np.testing.assert_allclose([step(x) for x in far], stable.predict(far), rtol=1e-9, atol=1e-9)
     assert np.isnan(step(np.full(3, np.nan))).all()
     N = np.broadcast_to(uc.constraints.projection([[0.0, 0.0, 1.0]]), (50, 3, 3))

@@ -132,7 +132,9 @@ def rollout(
         held = limits if isinstance(limits, Limits) else Limits(limits, _names(policy, x.shape[1]))
         check_inside(held, x)
         guards.append(held)
-    if hasattr(policy, "usual_distance") and getattr(policy, "stability_", None) is None:
+    stability = getattr(policy, "stability_", None)
+    leads_back = stability is not None and (constraint is None or stability.is_kept_under_constraints)
+    if hasattr(policy, "usual_distance") and not leads_back:
         guards.append(Recorded(policy, beyond))
     if constraint is None:
         return simulate(policy, start, steps, dt, stop_when=stop_when, guards=guards)

@@ -5,7 +5,7 @@ curve at that phase: along the radius, and across the plane. Both are known in c
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,9 @@ class Cycle:
     extent: float
     hold: float
     notes: tuple[str, ...] = ()
+
+    is_kept_under_constraints: ClassVar[bool] = False
+    """Whether states cannot run away where a constraint takes part of an action."""
 
     @classmethod
     def learn(

@@ -1,7 +1,7 @@
 """The smallest change of an action that makes a Lyapunov function fall, in closed form."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -71,6 +71,9 @@ class Stability:
     extent: float
     hold: float
     notes: tuple[str, ...] = ()
+
+    is_kept_under_constraints: ClassVar[bool] = True
+    """Whether states cannot run away where a constraint takes part of an action."""
 
     @classmethod
     def learn(cls, space: Space, goal: Array, scale: Array, X: Array, U: Array, hold: float) -> Self:

@@ -277,8 +277,26 @@ def real(data: Path, part: tuple[str, ...], repetitions: int, out: Path) -> None
     console.print(f"written: {out / 'real.md'}", soft_wrap=True)
 
 
+@click.command("cycles", cls=Command)
+@click.argument("data", type=PATH, metavar="DATA_FOLDER")
+def cycles(data: Path) -> None:
+    """Follow movements that go round and round for ten periods, plain and kept on a cycle.
+
+    DATA_FOLDER holds planer_circle.csv, curve_circle.csv and wiping/*.mat.
+    """
+    from reproduction.cycles import measure_all, tabulate
+
+    console = _console()
+    with console.status("learning"):
+        rows, refused = measure_all(data)
+    console.print(tabulate(rows), soft_wrap=True)
+    for sentence in refused:
+        console.print(sentence, soft_wrap=True)
+
+
 program.add_command(run_all)
 program.add_command(real)
+program.add_command(cycles)
 program.add_command(stability)
 program.add_command(view)
 

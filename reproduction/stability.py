@@ -13,6 +13,7 @@ from unconstrain.errors import UnconstrainError
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, TRUE
 from unconstrain.policies import LocallyLinearPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.stability import Stability
 
 TUNED_ON = ("Angle", "BendedLine", "Snake", "Sshape")
 """Shapes that the constants of `unconstrain.stability` were chosen on."""
@@ -212,7 +213,7 @@ def plot_shapes(folder: Path, shapes: list[str]) -> Figure:
     for shape, panel in zip(shapes, panels, strict=False):
         learnt = _learn(folder, shape, 0)
         stability = learnt.stable.stability_
-        assert stability is not None
+        assert isinstance(stability, Stability)
         fine = learnt.grid(60)
         x, y, levels = (each.reshape(60, 60) for each in (*fine.T, np.sqrt(stability.value(fine))))
         panel.contour(x, y, levels, levels=12, colors=RECORDED, linewidths=0.3)
@@ -270,7 +271,7 @@ def _learn(folder: Path, shape: str, repetition: int) -> _Learnt:
 def _follow(policy: Policy, starts: np.ndarray, steps: int, size: float) -> tuple[float, float, int]:
     """Return the share of starts that end at the goal, when the last of them arrives, and on how many steps V rose."""
     movement = policy.rollout(starts, steps, DT)
-    assert policy.stability_ is not None
+    assert isinstance(policy.stability_, Stability)
     away = np.linalg.norm(movement.states, axis=1).reshape(len(starts), -1)
     values = policy.stability_.value(movement.states).reshape(len(starts), -1)
     rises = int(np.sum(values[:, 1:] > values[:, :-1]))

@@ -35,6 +35,15 @@ def test_however_far_the_centre_in_that_direction_is_active(distance):
     np.testing.assert_allclose(b.sum(axis=1), 1.0)
 
 
+@pytest.mark.parametrize("distance", [1e3, 1e10, 1e16, 1e20])
+def test_one_state_and_a_batch_agree_where_centres_tie(distance):
+    ticks = np.linspace(-1, 1, 6)
+    grid = np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3)
+    far = distance * np.random.default_rng(0).integers(-2, 3, size=(60, 3)) + 0.5
+    one_by_one = np.concatenate([normalized_activations(x[None], grid, 0.5) for x in far])
+    np.testing.assert_array_equal(normalized_activations(far, grid, 0.5), one_by_one)
+
+
 def test_near_and_far_say_the_same_where_they_meet():
     direction = X[:1] / np.linalg.norm(X[0])
     near, far = (normalized_activations(d * direction, 0.1 * C, 1.0) for d in (30.2, 30.5))

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+import unconstrain as uc
 from unconstrain.constraints import projection
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.limit_cycle import demonstrate
 from unconstrain.simulation import rollout, simulate
+from unconstrain.stopping import MovementStopped
 
 
 def decay(X):
@@ -87,8 +89,9 @@ def test_no_rows_is_no_constraint():
 
 def test_a_movement_ends_at_the_first_state_that_says_so():
     ended = rollout(decay, [[1.0], [2.0]], steps=50, dt=0.1, stop_when=lambda X: X[:, 0] < 0.8)
-    assert len(ended) == 2 * 4
-    assert by_start(ended)[0, -1, 0] < 0.8 <= by_start(ended)[0, -2, 0]
+    assert [len(ended.episode(k)) for k in range(2)] == [4, 10]
+    assert all(ended.episode(k).states[-1] < 0.8 <= ended.episode(k).states[-2] for k in range(2))
+    assert not ended.stopped
     np.testing.assert_array_equal(ended.actions, -ended.states)
     assert len(rollout(decay, [1.0], steps=50, dt=0.1, stop_when=lambda X: True)) == 1
 
@@ -119,11 +122,33 @@ def test_a_plant_says_how_it_is_constrained_and_how_it_moves():
     assert len(simulate(decay, [1.0], 0, 1.0)) == 1
 
 
-def test_a_diverging_policy_is_named_with_its_step():
-    with pytest.raises(UnconstrainError, match=r"at step 3 of 5 \(0\.3 s\): use a smaller time step"):
-        rollout(lambda X: 1e120 * X, [1.0], steps=5, dt=0.1)
-    with pytest.raises(UnconstrainError, match="at step 1 of 1"):
-        rollout(lambda X: np.where(X > 1, np.inf, 1.0), [1.0], steps=1, dt=0.1)
+def test_each_movement_stops_by_itself_where_it_diverges():
+    with pytest.warns(
+        MovementStopped, match=r"1 of 2 .* no. 0 stopped after 1 of 5 steps \(0.1 s\), at x1 1e\+119: "
+    ):
+        result = rollout(lambda X: np.where(X > 0.5, 1e120 * X, -X), [[1.0], [0.2]], steps=5, dt=0.1)
+    assert [len(result.episode(k)) for k in range(2)] == [2, 6]
+    assert [(stop.episode, stop.step) for stop in result.stopped] == [(0, 1)]
+    with pytest.raises(UnconstrainError, match="not finite at step 0 of 1"):
+        rollout(lambda X: X + np.inf, [1.0], steps=1, dt=0.1)
+
+
+def test_movements_stay_near_what_was_recorded_and_within_limits():
+    X = np.random.default_rng(0).uniform(-1, 1, size=(400, 2))
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(20), risk="direct", alpha=1e-6).fit(X, X)
+    assert policy.distance(X).max() == 0
+    with pytest.warns(MovementStopped):
+        result = policy.rollout([[0.5, 0.0], [0.0, -0.2], [9.0, 9.0]], steps=4000, dt=0.005, beyond=0.7)
+    assert [stop.episode for stop in result.stopped] == [0, 1, 2]
+    assert policy.distance(result.select(result.episodes < 2).states).max() <= 0.7
+    assert policy.distance(np.stack([stop.state for stop in result.stopped[:2]])).min() > 0.6
+    assert len(result.episode(2)) == 1  # a start far away
+    with pytest.warns(MovementStopped, match="x2 would be -0.5"):
+        held = policy.rollout(
+            [[0.0, -0.2], [0.3, 0.1]], 60, 0.02, limits=[None, (-0.5, np.inf)], beyond=np.inf
+        )
+    assert [len(held.episode(k)) < 61 for k in range(2)] == [True, False]
+    assert held.states[:, 1].min() >= -0.5
 
 
 def test_what_does_not_fit_into_memory_is_refused_before_the_work():

@@ -101,11 +101,14 @@ def _exponents_from_afar(X: np.ndarray, centers: np.ndarray, width: float) -> np
     """Compute `-‖x - c‖² / 2σ²` without the part that all centres share, and without squaring a state.
 
     With m the centres' mean that is `(c - m)ᵀ(x - m) / σ² - ‖c - m‖² / 2σ²`, less the largest. Neither overflows, nor
-    drowns the centres' differences in the distance that they share.
+    drowns the centres' differences in the distance that they share. A matrix product would round otherwise in a batch
+    than for one state, and where centres tie, far away that decides between them.
     """
     mean = centers.mean(axis=0)
-    away = (centers - mean) / width
-    exponent = ((X - mean) / width) @ away.T - 0.5 * np.sum(away**2, axis=1)
+    away, toward = (centers - mean) / width, (X - mean) / width
+    exponent = np.tile(-0.5 * np.sum(away**2, axis=1), (len(X), 1))
+    for along, state in zip(away.T, toward.T, strict=True):
+        exponent += state[:, None] * along
     return exponent - exponent.max(axis=1, keepdims=True)
 
 

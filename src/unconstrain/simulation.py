@@ -4,6 +4,7 @@
 places for plants that are more than that: what projects the policy's action, and how the plant moves on.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -12,10 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from unconstrain.arrays import check_numbers, quote
 from unconstrain.constraints.nullspace import constrain, projection
-from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.memory import check_memory
 from unconstrain.spaces import Numbers, Space
+from unconstrain.stopping import (
+    OUT_OF_BOUNDS,
+    Guard,
+    Limits,
+    Movement,
+    MovementStopped,
+    Recorded,
+    Stop,
+    check_inside,
+    describe_stop,
+)
 
 Array = NDArray[np.float64]
 
@@ -51,11 +62,17 @@ def rollout(
     constraint: Constraint | None = None,
     *,
     stop_when: StopWhen | None = None,
-) -> Demonstrations:
+    beyond: float | None = None,
+    limits: Any = None,
+) -> Movement:
     """Integrate a policy whose actions are velocities of its state: ``x_{k+1} = x_k + dt N(x_k) π(x_k)``.
 
     States of a space, such as rotations, are followed within it (`Space.step`); with accelerations for actions, so are
     velocities.
+
+    A movement stops by itself, with a warning, before it leaves what a policy of this library was learnt from, its
+    limits, or all bounds; what it reached is returned. A stabilised policy may leave what was recorded, since it leads
+    back.
 
     Parameters
     ----------
@@ -72,12 +89,20 @@ def rollout(
         (S, n) and returns the rows at each, (S, k, n), or (k, n) where all share them. Without it the
         policy moves freely.
     stop_when : callable, optional
-        Is given the current states (S, n). The movement ends at the first states for any of which it returns true.
+        Is given the current states (S, n). Each movement ends at its first state for which it returns true.
+    beyond : float, optional
+        How far from recorded states a movement may lead, in the policy's `distance_unit_`; by default as far as
+        recordings lead from each other (`Policy.usual_distance`), infinite for anywhere, unless it diverges. Functions,
+        and policies of others, do not know what was recorded.
+    limits : sequence of n pairs, or mapping from str to pairs, optional
+        The least and the largest value that each state may have, as those of joints, None where there is none; or by
+        the names of the states, {"elbow": (-1.5, 1.5)}.
 
     Returns
     -------
-    Demonstrations
-        ``steps + 1`` samples per start, fewer if `stop_when` ended the movement: the state, the action
+    Movement
+        Demonstrations of ``steps + 1`` samples per start, fewer where one ended; `stopped` says which had to, where and
+        why. Samples have the state, the action
         ``N π(x)`` there, the policy's own action ``π(x)`` as `policy`, and the time in seconds. Every start is an
         episode. Under a constraint, `projections` holds N. States have the names that the policy learnt, if it
         knows them.
@@ -89,8 +114,8 @@ def rollout(
     DataError
         If the start or the constraint is not finite or of the wrong shape.
     UnconstrainError
-        If `steps` or `dt` is not positive, the samples do not fit into memory, or the state grows beyond all
-        bounds.
+        If `steps` or `dt` is not positive, the samples do not fit into memory, a start is beyond the limits, or the
+        action there is not finite.
 
     Examples
     --------
@@ -101,8 +126,18 @@ def rollout(
     """
     if _whole(steps) < 1:
         raise UnconstrainError(f"a rollout needs a whole number of steps, at least 1, not {quote(steps)}")
+    guards: list[Guard] = []
+    if limits is not None:
+        x = _checked_start(start, getattr(policy, "n_features_in_", None))
+        held = limits if isinstance(limits, Limits) else Limits(limits, _names(policy, x.shape[1]))
+        check_inside(held, x)
+        guards.append(held)
+    stability = getattr(policy, "stability_", None)
+    leads_back = stability is not None and (constraint is None or stability.is_kept_under_constraints)
+    if hasattr(policy, "usual_distance") and not leads_back:
+        guards.append(Recorded(policy, beyond))
     if constraint is None:
-        return simulate(policy, start, steps, dt, stop_when=stop_when)
+        return simulate(policy, start, steps, dt, stop_when=stop_when, guards=guards)
     if callable(constraint):
 
         def project(sample: int, X: Array, wanted: Array) -> Array:
@@ -114,7 +149,7 @@ def rollout(
         def project(sample: int, X: Array, wanted: Array) -> Array:
             return _one_per_start(fixed, *wanted.shape)
 
-    return simulate(policy, start, steps, dt, project=project, stop_when=stop_when)
+    return simulate(policy, start, steps, dt, project=project, stop_when=stop_when, guards=guards)
 
 
 def simulate(
@@ -126,9 +161,10 @@ def simulate(
     project: Project | None = None,
     advance: Advance | None = None,
     stop_when: StopWhen | None = None,
+    guards: Sequence[Guard] = (),
     state_names: Sequence[str] | None = None,
     action_names: Sequence[str] | None = None,
-) -> Demonstrations:
+) -> Movement:
     """Let a policy move a plant, and record every sample.
 
     At sample k the policy is asked for its actions ``π(x_k)``, `project` for the projections ``N``, and `advance`
@@ -153,12 +189,15 @@ def simulate(
         afterwards. By default ``X + dt U, U``, and actions have to be velocities of the state.
     stop_when : callable, optional
         As for `rollout`.
+    guards : sequence of callable
+        Each says of states (S, n) why a movement may not be there, in a list of texts, empty where it may. It then
+        stops before.
     state_names, action_names : sequence of str, optional
         By default the names that the policy learnt, or x1, x2, ...; actions are named after the states' velocities.
 
     Returns
     -------
-    Demonstrations
+    Movement
         As for `rollout`.
 
     Raises
@@ -184,7 +223,17 @@ def simulate(
         stable: Any = policy
         stable = stable.held_for(dt)
         predict, under = stable.predict, stable.predict_constrained
-    # A policy may overflow on its way out of all bounds; the sentence below says so better than a warning.
+    going: NDArray[np.bool_] = np.ones(len(x), dtype=bool)
+    ends, stops = np.full(len(x), samples), list[Stop]()
+
+    def halt(reasons: Sequence[str], step: int) -> None:
+        """Stop each movement for which there is a reason, with this step as its last."""
+        for start, reason in enumerate(reasons):
+            if reason and going[start]:
+                going[start], ends[start] = False, step + 1
+                stops.append(Stop(start, step, step * dt, states[start, step].copy(), reason))
+
+    # A policy may overflow on its way out of all bounds; the sentence of its stop says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(samples):
             wanted = _actions(predict, x)
@@ -202,35 +251,64 @@ def simulate(
                 projections = None if N is None else np.empty((S, samples, d, d))
             if advance is None:
                 _check_velocities(space, x, u)
-                following = space.step(x, u, dt)
             else:
                 following, u = advance(x, u)
-            if not (np.isfinite(u).all() and (k + 1 == samples or np.isfinite(following).all())):
-                step = min(k + 1, steps)
+            finite = np.asarray(np.isfinite(u).all(axis=1))
+            if not finite[going].all() and (k == 0 or advance is not None):
                 raise UnconstrainError(
-                    f"the rollout left all bounds at step {step} of {steps} ({step * dt:g} s): use a smaller time step "
-                    "dt, or start nearer to the data the policy was learnt from"
+                    f"the actions are not finite at step {k} of {steps} ({k * dt:g} s): use a smaller time step dt, or "
+                    "start nearer to the data the policy was learnt from"
                 )
+            halt(["" if good else OUT_OF_BOUNDS for good in finite], k - 1)
             states[:, k], policies[:, k], actions[:, k] = x, wanted, u
             if projections is not None:
                 projections[:, k] = N
-            if k + 1 == samples or (stop_when is not None and np.any(stop_when(x))):
+            if k == 0:
+                halt(_find_reasons(guards, x, going), k)
+            if stop_when is not None:
+                ended = going & np.asarray(stop_when(x), dtype=bool)
+                ends[ended] = k + 1
+                going[ended] = False
+            if k + 1 == samples or not going.any():
                 break
-            x = following
+            if advance is None:
+                following = space.step(x, np.where(finite[:, None], u, 0.0), dt)
+            halt(_find_reasons(guards, following, going), k)
+            x = np.where(going[:, None], following, x)
 
-    taken = k + 1
+    kept: NDArray[np.bool_] = np.arange(k + 1) < ends[:, None]
     names = _names(policy, x.shape[1]) if state_names is None else tuple(state_names)
-    return Demonstrations(
-        states=_flat(states, taken),
-        actions=_flat(actions, taken),
-        episodes=np.repeat(np.arange(len(x)), taken),
-        time=np.tile(np.arange(taken) * dt, len(x)),
-        policy=_flat(policies, taken),
-        projections=None if projections is None else _flat(projections, taken),
+    stops.sort(key=lambda stop: stop.episode)
+    _warn(stops, steps, names, len(x))
+    return Movement(
+        states=states[:, : k + 1][kept],
+        actions=actions[:, : k + 1][kept],
+        episodes=np.repeat(np.arange(len(x)), kept.sum(axis=1)),
+        time=np.tile(np.arange(k + 1) * dt, (len(x), 1))[kept],
+        policy=policies[:, : k + 1][kept],
+        projections=None if projections is None else projections[:, : k + 1][kept],
         state_names=names,
         action_names=_action_names(space, names, actions.shape[-1]) if action_names is None else action_names,
         space=space if advance is None else None,
+        stopped=stops,
     )
+
+
+def _find_reasons(guards: Sequence[Guard], X: Array, going: NDArray[np.bool_]) -> list[str]:
+    """Return why each movement may not be in its state (S, n), empty where it may or has ended."""
+    finite = np.asarray(np.isfinite(X).all(axis=1))
+    reasons = ["" if good else OUT_OF_BOUNDS for good in finite]
+    rows = np.flatnonzero(finite & going)
+    for guard in guards if len(rows) else ():
+        for row, reason in zip(rows.tolist(), guard(X[rows]), strict=True):
+            reasons[row] = reasons[row] or reason
+    return reasons
+
+
+def _warn(stops: Sequence[Stop], steps: int, names: Sequence[str], starts: int) -> None:
+    if stops:
+        of = "" if starts == 1 else f"{len(stops)} of {starts} movements stopped; no. {stops[0].episode} "
+        warnings.warn(of + describe_stop(stops[0], steps, names), MovementStopped, stacklevel=4)
 
 
 def check_size(starts: int, samples: int, n: int, d: int, *, constrained: bool) -> None:
@@ -345,11 +423,6 @@ def _action_names(space: Space, states: tuple[str, ...], d: int) -> tuple[str, .
     if not space.is_flat and d == space.n_actions:
         return space.action_names(states)
     return tuple(f"{name}_velocity" for name in states) if len(states) == d else None
-
-
-def _flat(values: Array, taken: int) -> Array:
-    """Put the first samples of every start one after the other, (S taken, ...)."""
-    return values[:, :taken].reshape(-1, *values.shape[2:])
 
 
 def _count(number: int, noun: str) -> str:

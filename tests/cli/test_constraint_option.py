@@ -27,5 +27,8 @@ def test_a_learnt_constraint_is_told_to_what_was_recorded_under_it(run, tmp_path
     assert "verdict: " in out
     code, _, err = run("fit", "free.npz", *told, "--out", "other.skops")
     assert code == 2
-    assert "samples move across the constraint, so they were not recorded under it: leave out --constraint" in err
+    assert (
+        "samples move across the constraint, so they were not recorded under it: leave out --constraint"
+        in err
+    )
     assert not (tmp_path / "other.skops").exists()

@@ -1,12 +1,14 @@
 import numpy as np
 import pytest
 
+import unconstrain as uc
 from unconstrain.policies import load_policy
 
 
 def test_a_movement_under_a_constraint(run, policy, tmp_path):
     code, out, err = run(
-        "rollout", policy, "--start", "0.1,0.1", "--steps", 50, "--block", "1,0", "--figure", "r.svg"
+        *("rollout", policy, "--start", "0.1,0.1", "--steps", 50, "--block", "1,0", "--figure", "r.svg"),
+        *("--beyond", "anywhere"),
     )
     assert code == 0, err
     path = np.genfromtxt("rollout.csv", delimiter=",", names=True)
@@ -21,7 +23,7 @@ def test_a_movement_under_a_constraint(run, policy, tmp_path):
     assert code == 2
     assert "rollout.csv exists: give --overwrite to replace it, or another name with --out" in err
     assert (tmp_path / "rollout.csv").read_text() == before
-    assert run("rollout", policy, "--start", "0.2,0.1", "--overwrite")[0] == 0
+    assert run("rollout", policy, "--start", "0.2,0.1", "--overwrite", "--beyond", "anywhere")[0] == 0
     assert (tmp_path / "rollout.csv").read_text() != before
 
 
@@ -34,6 +36,16 @@ def test_a_movement_under_a_constraint(run, policy, tmp_path):
         (["--start", "0,0", "--block", "1"], "--block must have 2 numbers"),
         (["--start", "0,0", "--dt", "0"], "'--dt': it must be a positive number"),
         (["--start", "0,0", "--steps", "0"], "'--steps'"),
+        (["--start", "0,0", "--beyond", "far"], 'it must be a positive number or "anywhere"'),
+        (
+            ["--start", "0,0", "--limits", "-1:1"],
+            "--limits must have a least and a largest value for each of 2",
+        ),
+        (["--start", "0,0", "--limits", "z=-1:1"], "--limits names 'z', and the states are x1, x2"),
+        (
+            ["--start", "0,0", "--limits", "1:2,:"],
+            "the start is outside: the movement leaves the limits: x1 would be",
+        ),
         (["--start", "0,0", "--steps", str(10**12)], "take fewer steps"),
         (["--start", "0,0", "--figure", "r.txt"], "r.txt"),
         (["--start", "0,0", "--out", "kept.skops", "--overwrite"], "choose another name for --out"),
@@ -46,6 +58,47 @@ def test_mistakes(run, policy, tmp_path, arguments, sentence):
     assert sentence in err
     assert {p.name for p in tmp_path.iterdir()} == {policy.name}
     assert load_policy(policy).n_features_in_ == 2
+
+
+def test_a_movement_that_has_to_stop_is_kept_up_to_there(run, tmp_path):
+    x = np.random.default_rng(0).uniform(-1, 1, size=(300, 2))
+    uc.ParametricPolicy(risk="direct", alpha=1e-6).fit(x, x @ [[0.0, 1.0], [0.0, 0.5]]).save("away.skops")
+    move = ("rollout", "away.skops", "--start=0.5,0.1", "--steps", 9000, "--overwrite")
+    lengths = {}
+    for option, value, sentence in (
+        ("--beyond", 0.5, "leaves what was recorded: it leads 0.5"),
+        ("--beyond", "anywhere", "diverges: it leads"),
+        ("--limits", "x2=:0.7", "leaves the limits: x2 would be 0.70"),
+    ):
+        code, out, err = run(*move, option, value)
+        assert code == 3, err
+        (said,) = (line for line in out.splitlines() if line.startswith("stopped after "))
+        assert sentence in said
+        assert ("say with --beyond how far" in said) == ("recorded: " in sentence)
+        path = np.genfromtxt("rollout.csv", delimiter=",", names=True)
+        lengths[value] = len(path)
+        assert f"stopped after {len(path) - 1} of 9000 steps" in said
+        assert np.isfinite(path["x2"]).all()
+    assert path["x2"][-1] <= 0.7
+    assert lengths["x2=:0.7"] < lengths[0.5] < lengths["anywhere"] < 9000
+    assert (tmp_path / "rollout.png").stat().st_size > 0
+
+
+def test_the_limits_of_a_robot_are_those_of_its_joints(run, policy):
+    pytest.importorskip("mujoco")
+    joint = '<joint name="{}" type="hinge" limited="true" range="-0.5 0.11"/><geom size="0.1"/>'
+    body = f"<body>{joint.format('x1')}<body>{joint.format('x2')}</body></body>"
+    head = '<mujoco><compiler angle="radian"/><worldbody>'
+    for name, text in (("named.xml", body), ("other.xml", body.replace("x1", "q1").replace("x2", "q2"))):
+        with open(name, "w") as file:
+            file.write(f"{head}{text}</worldbody></mujoco>")
+        move = ("--start", "0.1,0.1", "--beyond", "anywhere", "--overwrite", "--limits", name)
+        code, out, err = run("rollout", policy, *move)
+        assert code == 3, err
+        assert "its upper limit is 0.11" in out
+        assert ("note: limits are taken in the order of the joints, so x1 is q1" in out) == (
+            name == "other.xml"
+        )
 
 
 def test_a_policy_that_is_relative_to_its_goal_is_told_where_that_is(run, tmp_path):
@@ -74,7 +127,7 @@ def test_a_policy_that_is_relative_to_its_goal_is_told_where_that_is(run, tmp_pa
     stops = []
     for far in (0, 1000):
         place = (f"--start={6 + far},5", f"--goal={5 + far},5")
-        _, out, _ = run("rollout", "reach.skops", *place, "--stop-when-unsure", 1, "--overwrite")
-        stops += [line for line in out.splitlines() if line.startswith("stopped after")]
+        _, out, _ = run("rollout", "reach.skops", *place, "--stop-when-unsure", 1e-3, "--overwrite")
+        stops += [line for line in out.splitlines() if "as it was recorded" in line]
     assert len(stops) == 2
     assert stops[0] == stops[1]

@@ -57,7 +57,7 @@ def test_a_goal_in_numbers_also_of_a_policy_that_was_saved_without(run, reaches)
         assert "the goal is reached after " in out
         assert ("stable at: x 0.5, y 1.5" in out) == bool(option)
         assert np.allclose(ends(), (0.5, 1.5), atol=0.06)
-    code, out, _ = run("rollout", "plain.skops", "--start=-2,3", "--overwrite")
+    code, out, _ = run("rollout", "plain.skops", "--start=-2,3", "--overwrite", "--beyond", "anywhere")
     assert code == 0
     assert "the goal" not in out
 

@@ -254,10 +254,16 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
     policy.save(saved, resumable=True)
     move = ["rollout", saved, "--start=-0.7,0", "--steps", "400"]  # the cycle leads to the right
     paths = ["--out", str(tmp_path / "path.csv"), "--figure", str(tmp_path / "path.png")]
-    _, stopped, _ = run(*move, *paths, "--stop-when-unsure", "0.3")
-    assert "of 400 steps: the policy is known to within ±" in stopped
+    code, stopped, _ = run(*move, *paths, "--stop-when-unsure", "0.3")
+    assert code == 3
+    assert ": the policy is known to within ±" in stopped
     assert Unsure(policy, 0.3)(np.array([[-0.7, 0.0], [0.7, 0.0]])).tolist() == [False, True]
-    code, _, refused = run(*move, *paths, "--overwrite", "--stop-when-unsure", "1e-9")
+    # Where people were a movement may begin, however little is known; elsewhere not.
+    code, noted, _ = run(*move, *paths, "--overwrite", "--stop-when-unsure", "1e-9")
+    assert code == 3
+    assert "note: at the start, as it was recorded, the policy is known to within ±" in noted
+    move[2] = "--start=0.7,0"
+    code, _, refused = run(*move, *paths, "--overwrite", "--stop-when-unsure", "0.3", "--beyond", "anywhere")
     assert code == 2
     assert "at the start already" in refused
 

@@ -17,22 +17,21 @@ def test_the_commands_print_what_the_page_says(tmp_path, capsys):
         for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
             exec(block, {})
         printed = ""
-        (commands,) = (
-            block for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL) if "fit" in block
-        )
-        for command in commands.strip().splitlines():
-            assert run(shlex.split(command)[1:]) == 0
+        blocks = re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL)
+        commands = [c for block in blocks if ".csv --state x,y" in block for c in block.strip().splitlines()]
+        codes = []
+        for command in commands:
+            codes.append(run(shlex.split(command)[1:]))
             printed += capsys.readouterr().out
-        fit = commands.splitlines()[0].replace("--stable-at end ", "").replace("reach.skops", "plain.skops")
-        for command in (fit, 'unconstrain rollout plain.skops --start="-0.5,-0.3" --overwrite'):
-            assert run(shlex.split(command)[1:]) == 0
+        assert codes == [0, 0, 0, 0, 3, 3]
+        assert run(shlex.split('rollout plain.skops --start="-0.5,-0.3" --beyond anywhere --overwrite')) == 0
         plain = np.genfromtxt("rollout.csv", delimiter=",", names=True)
     said = [
         line
         for block in re.findall(r"```text\n(.*?)```", PAGE, flags=re.DOTALL)
         for line in block.splitlines()
     ]
-    assert len(said) == 5
+    assert len(said) == 7
     for line in said:
         assert line in printed.splitlines()
     left = np.hypot(plain["x"][-1], plain["y"][-1])

@@ -53,6 +53,9 @@ def assert_same_fit(streamed, whole, states=X):
     P = whole.predict(states)
     # Rounding of 1e-16 in H is that over λ in the policy; what is compared is the policy, not its noise.
     np.testing.assert_allclose(streamed.predict(states), P, rtol=1e-6, atol=1e-8 * np.abs(P).max())
+    # Boxes of those that went before are of the unit of these.
+    assert streamed.region().distance(whole.region().middles).max() < 0.5
+    assert streamed.usual_distance() == pytest.approx(whole.usual_distance(), rel=0.3)
 
 
 @settings(deadline=None, max_examples=25)

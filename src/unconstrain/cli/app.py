@@ -54,7 +54,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        The exit code: 0, 1 if standard output could not be written, or 2 after a mistake of the user's.
+        The exit code: 0, 1 if standard output could not be written, 2 after a mistake of the user's, or 3 where a
+        movement had to stop.
 
     Raises
     ------

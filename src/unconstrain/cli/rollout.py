@@ -1,17 +1,24 @@
 """`unconstrain rollout`: where a policy leads, free or under a constraint."""
 
+import math
+import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from unconstrain.cli import outputs, reporting, stabilizing
-from unconstrain.cli.command import command
+from unconstrain.cli import limiting, outputs, reporting, stabilizing
+from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.cli.declared import Number, Numbers
 from unconstrain.errors import DataError
 from unconstrain.progress import working
 from unconstrain.recordings.columns import START
+
+STOPPED = 3
+"""The exit code where a movement had to stop: its file holds what was reached."""
+
+ANYWHERE = "anywhere"
 
 if TYPE_CHECKING:
     import numpy as np
@@ -54,12 +61,26 @@ if TYPE_CHECKING:
 )
 @stabilizing.stable_at(
     'Make the policy end there: a state, "0.1,0.2"; "end" for a policy learnt with --relative-to goal. Actions are '
-    "changed as little as that takes. A policy fitted with --stable-at ends at its own goal without this."
+    "changed as little as that takes. A policy fitted with --stable-at does so without this, or goes round its cycle."
 )
 @click.option(
     "--stop-when-unsure",
     type=Number(),
-    help="End where the policy's standard deviation exceeds this share of its speed: 0.5, say.",
+    help="Stop where the policy's standard deviation exceeds this share of its speed, and of the recordings' usual "
+    "speed: 0.5, say.",
+)
+@click.option(
+    "--beyond",
+    type=Number(words=(ANYWHERE,)),
+    help="How far from recorded states the movement may lead before it stops, in widths of receptive fields (without "
+    f'these in half-spreads of the states), or "{ANYWHERE}"; by default as far as recordings lead from each other, at '
+    "least 1. A stable policy may lead anywhere, since it comes back.",
+)
+@click.option(
+    "--limits",
+    type=limiting.LimitsType(),
+    help='Stop before a state leaves its limits: "-1:1,0:2" for each, "x=-1:1" by name, or the file of a robot (URDF, '
+    "MJCF), for its joints.",
 )
 @outputs.out("rollout.csv", "Where the movement is written (CSV).")
 @outputs.figure("Where it is drawn", "rollout.png")
@@ -73,13 +94,16 @@ def rollout(
     goal: list[float] | None,
     stable_at: list[float] | str | None,
     stop_when_unsure: float | None,
+    beyond: float | str | None,
+    limits: Any,
     out: Path,
     figure: Path,
     overwrite: bool,
 ) -> None:
     """Integrate a saved policy from a start, free or under a constraint.
 
-    POLICY was saved by `unconstrain fit`.
+    POLICY was saved by `unconstrain fit`. A movement that leaves what was recorded, or its limits, or diverges, stops
+    there: what was reached is written, and the exit code is 3.
     """
     outputs.check_outputs([policy], {"out": out, "figure": figure}, overwrite=overwrite)
     import numpy as np
@@ -89,6 +113,7 @@ def rollout(
     from unconstrain.policies.unsure import Unsure
     from unconstrain.recordings.text import write_csv
     from unconstrain.simulation import rollout as integrate
+    from unconstrain.stopping import Limits, MovementStopped, Stop, describe_stop
 
     learnt = load_policy(policy)
     begin = _completed(start, "start=", learnt.space_)
@@ -99,31 +124,49 @@ def rollout(
         learnt = _stabilize(learnt, stable_at, frame)
     unsure = None if stop_when_unsure is None else Unsure(learnt, stop_when_unsure)
     rows = np.array(block).reshape(-1, learnt.n_actions_)
+    names = getattr(learnt, "state_names_", [f"x{i + 1}" for i in range(len(begin))])
+    held = None
+    if limits is not None:
+        held = Limits(limiting.read_limits(limits, names), names, None if frame is None else frame.out_of)
     if frame is not None:
         begin, rows = frame.into(begin[None])[0], frame.constraint_into(rows)
-    with working("rolling out"):
-        movement = integrate(learnt, begin, steps, dt, rows if len(rows) else None, stop_when=unsure)
+    if unsure is not None and unsure.starting_at(begin):
+        known = _unsure_at(unsure, begin)
+        reporting.say(f"note: at the start, as it was recorded, {known}; it may not become less sure")
+    with working("rolling out"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", MovementStopped)  # which is said below
+        movement = integrate(
+            *(learnt, begin, steps, dt, rows if len(rows) else None),
+            stop_when=unsure,
+            beyond=math.inf if isinstance(beyond, str) else beyond,
+            limits=held,
+        )
     taken = len(movement) - 1
-    if unsure is not None and taken == 0:
+    stop = movement.stopped[0] if movement.stopped else None
+    if unsure is not None and taken == 0 and stop is None:
         raise DataError(
             f"at the start already {_unsure_at(unsure, movement.states[0])}: start nearer to the recordings, or give a "
             "larger share to stop_when_unsure="
         )
     last = movement.states[-1]  # as the policy has it
     arrival = None if learnt.stability_ is None else stabilizing.describe_arrival(learnt, movement)
-    if frame is not None:
-        movement = _out_of(frame, movement)
-    write_csv(movement, out)
-    plot.save(plot.rollout_figure(movement), figure)
-    end = zip(movement.state_names, movement.states[-1], movement.states.std(axis=0), strict=True)
+    shown = movement if frame is None else _out_of(frame, movement)
+    write_csv(shown, out)
+    plot.save(plot.rollout_figure(shown), figure)
+    end = zip(shown.state_names, shown.states[-1], shown.states.std(axis=0), strict=True)
     reached = ", ".join(f"{name} {reporting.shown_number(value, scale)}" for name, value, scale in end)
     reporting.say(f"after {taken * dt:g} s: {reached}")
     _describe_phase(movement, dt)
     if arrival is not None:
         reporting.say(arrival)
-    if unsure is not None and taken < steps:
-        reporting.say(f"stopped after {taken} of {steps} steps: {_unsure_at(unsure, last)}")
+    if stop is None and unsure is not None and taken < steps:
+        stop = Stop(0, taken, taken * dt, last, _unsure_at(unsure, last))
+    if stop is not None:
+        sentence = describe_stop(stop, steps, shown.state_names, shown.states[-1])
+        reporting.say(in_words_of_program(sentence))
     reporting.say(f"movement: {out}\nfigure: {figure}")
+    if stop is not None:
+        click.get_current_context().exit(STOPPED)
 
 
 def _stabilize(learnt: "Policy", goal: list[float] | str, frame: "Frame | None") -> "Policy":

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from unconstrain.demonstrations import Demonstrations
     from unconstrain.policies.base import Policy
     from unconstrain.recordings.columns import Columns
+    from unconstrain.stability import Cycle
 
-END = "end"
+END, CYCLE = "end", "cycle"
 
 LITTLE_FREEDOM = 0.1
 """Share of the steepest way down below which a constraint is what keeps a movement from the goal."""
@@ -21,7 +22,7 @@ LITTLE_FREEDOM = 0.1
 
 def stable_at(help: str, section: str = "Options") -> Callable[[Callable], Callable]:
     """Make the option for the goal that a policy is made to end at."""
-    return option("--stable-at", type=Numbers(words=(END,)), metavar="GOAL", help=help, section=section)
+    return option("--stable-at", type=Numbers(words=(END, CYCLE)), metavar="GOAL", help=help, section=section)
 
 
 def stabilize(
@@ -36,7 +37,7 @@ def stabilize(
     ----------
     policy : Policy
         Fitted.
-    goal : list of float or "end"
+    goal : list of float, "end" or "cycle"
         In the states that the policy is over.
     columns : Columns or None
         That it was learnt from.
@@ -55,6 +56,8 @@ def stabilize(
     PolicyError
         As for `Policy.stabilized`.
     """
+    if goal == CYCLE:
+        return policy.stabilized(goal, demos)
     if goal != END:
         if len(goal) != policy.space_.n_states:
             raise DataError(
@@ -73,14 +76,17 @@ def stabilize(
 
 def describe(stable: "Policy") -> None:
     """Print where a policy is stable, and how far that has changed it."""
+    from unconstrain.stability import Cycle
+
     assert stable.stability_ is not None
-    reporting.say(f"stable at: {_describe_goal(stable)}")
+    about = "on a cycle about" if isinstance(stable.stability_, Cycle) else "at"
+    reporting.say(f"stable {about}: {_describe_goal(stable)}")
     for note in stable.stability_.notes:
         reporting.say(f"note: {note}")
 
 
 def describe_arrival(stable: "Policy", movement: "Demonstrations") -> str:
-    """Say whether a movement, as the policy has it, has reached the goal, and if not why.
+    """Say whether a movement, as the policy has it, has reached the goal or how it went round, and if not why.
 
     Parameters
     ----------
@@ -94,11 +100,14 @@ def describe_arrival(stable: "Policy", movement: "Demonstrations") -> str:
     str
         A sentence.
     """
+    from unconstrain.stability import Cycle
     from unconstrain.stability.stabilizing import ARRIVED
 
     stability = stable.stability_
     assert stability is not None
     assert movement.time is not None
+    if isinstance(stability, Cycle):
+        return _describe_turns(stability, movement)
     away = stability.distance(movement.states)
     left = f"{away[-1]:.3g} of the extent of the recorded states"
     if away[-1] <= ARRIVED:
@@ -112,6 +121,20 @@ def describe_arrival(stable: "Policy", movement: "Demonstrations") -> str:
                 f"movement ends as near as it leads, {left} away"
             )
     return f"the goal is not reached yet, {left} away: give more --steps"
+
+
+def _describe_turns(cycle: "Cycle", movement: "Demonstrations") -> str:
+    import numpy as np
+
+    assert movement.time is not None
+    phases = np.unwrap(cycle.phase(movement.states))
+    turns = float(phases[-1] - phases[0]) / (2 * np.pi)
+    away = float(cycle.distance(movement.states[-1:])[0])
+    told = f"the movement goes round {turns:.3g} times"
+    if turns >= 1:
+        taken = float(movement.time[-1]) / turns
+        told += f", once in {taken:.3g} s ({taken / cycle.period:.1%} of the recorded period)"
+    return f"{told}, and ends {away:.3g} of the extent of the recorded states from the cycle"
 
 
 def _describe_goal(stable: "Policy") -> str:

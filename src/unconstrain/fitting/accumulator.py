@@ -20,6 +20,7 @@ from unconstrain.fitting.in_space import in_units
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation, informative, observe, unknown
+from unconstrain.fitting.region import Region
 from unconstrain.fitting.solve import EpisodeFolds, choose_alpha
 from unconstrain.fitting.sums import Sums
 from unconstrain.motion import NO_MOTION, lengths
@@ -61,6 +62,8 @@ class Solution:
         How many independent samples one is worth, by its residuals.
     record : Record
         How that was found.
+    regions : tuple of Region or None
+        By fold: where the samples lie.
     noise, residual : float
         For "corrected": variance of the noise, and of what one sample shows about the policy (`Correction.residual`),
         in squared units of the action; else NaN.
@@ -79,6 +82,7 @@ class Solution:
     free_share: float = math.nan
     evidence: float = 1.0
     record: "Record" = field(default_factory=lambda: Record())
+    regions: tuple[Region | None, ...] = ()
     noise: float = math.nan
     residual: float = math.nan
     doubt: str = ""
@@ -131,6 +135,8 @@ class Accumulator:
     noise : float
         Variance of the actions' noise that is known beforehand, in squared units of the action; 0 where nothing is. For
         "adaptive" the noise that is inferred is not below it; for "corrected" no more is taken away.
+    unit : ndarray of shape (m,), optional
+        Along each dimension of the states as features see them: in what distances from the samples are counted.
 
     Attributes
     ----------
@@ -140,6 +146,8 @@ class Accumulator:
         What was added so far.
     is_judged : bool
         For "adaptive": whether the sums that λ is chosen by are kept too.
+    finds_region : bool
+        Whether it is kept where samples lie.
     compared : tuple of tuple of Belief
         For "adaptive": beliefs whose likelihood is summed up, instead of moments; each one for all samples, or one for
         each fold.
@@ -156,6 +164,7 @@ class Accumulator:
         scale: float = 1.0,
         record: Record | None = None,
         noise: float = 0.0,
+        unit: np.ndarray | None = None,
     ):
         self.model = model
         self.risk = risk
@@ -166,6 +175,8 @@ class Accumulator:
         self.scale = scale
         self.record = record or Record()
         self.noise = noise
+        self.unit = unit
+        self.finds_region = unit is not None
         self.is_judged = alpha == "cv"
         self.compared: tuple[tuple[Belief, ...], ...] = ()
         self.total = Sums()
@@ -237,6 +248,7 @@ class Accumulator:
             n_zero=len(U) - int(np.count_nonzero(moves)),
             n_known=0 if samples.projections is None else int(np.sum(~unknown(samples.projections))),
             longest=longest,
+            regions=self._find_regions(samples, fold),
         )
         if self.risk == "adaptive" and samples.weights is not None and not samples.weights.all():
             # Left out here, so that they do not speak for their neighbours either.
@@ -317,8 +329,10 @@ class Accumulator:
             self.scale,
             self.record,
             self.noise,
+            self.unit,
         )
         other.is_judged, other.compared = self.is_judged, self.compared
+        other.finds_region = self.finds_region
         return other
 
     def copy(self) -> "Accumulator":
@@ -449,7 +463,7 @@ class Accumulator:
     ) -> Solution:
         total, parameters = self.total, self.model.parameters(w)
         counts = (total.n_samples, total.n_zero, total.n_known)
-        solution = Solution(parameters, alpha, alphas, held_out_risk, *counts)
+        solution = Solution(parameters, alpha, alphas, held_out_risk, *counts, regions=total.regions)
         if self.belief is None:
             return solution
         states = total.tallies[0].counts.states
@@ -460,6 +474,20 @@ class Accumulator:
             evidence=total.tallies[0].evidence,
             record=self.record,
         )
+
+    def _find_regions(self, samples: Samples, fold: np.ndarray | None) -> tuple[Region | None, ...]:
+        if not self.finds_region or self.unit is None:
+            return ()
+        counts = np.ones(len(samples.states), dtype=bool) if samples.weights is None else samples.weights > 0
+        Z, unit, known = self.model.lay_out(samples.states), self.unit, self.total.regions
+
+        def find(rows: np.ndarray, k: int) -> Region:
+            before = known[k] if k < len(known) else None
+            return Region.of(Z[rows], unit, 0 if before is None else before.coarseness)
+
+        numbers = [0] if fold is None else range(1 + int(fold.max(initial=0)))
+        inside = [counts if fold is None else counts & (fold == k) for k in numbers]
+        return tuple(find(rows, k) if rows.any() else None for k, rows in enumerate(inside))
 
     def _folds(self, without: int | None) -> list[Any]:
         folds = [part for k, part in enumerate(self.total.moments) if part is not None and k != without]

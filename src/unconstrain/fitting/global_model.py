@@ -43,6 +43,12 @@ class GlobalModel:
         return
 
     @property
+    def width(self) -> float | np.ndarray | None:
+        """Width of the features' receptive fields; see `Model.width`."""
+        transformer = getattr(self.features, "transformer_", self.features)
+        return getattr(transformer, "width_", None)
+
+    @property
     def shares_basis(self) -> bool:
         """Whether all actions share one basis, `Φ(x) = I ⊗ b(x)ᵀ`."""
         return isinstance(self.features, FullBasis)
@@ -83,6 +89,10 @@ class GlobalModel:
     def reach(self, X: np.ndarray) -> np.ndarray:
         """Return ones, since every sample reaches the model in full; see `Model.reach`."""
         return np.ones((len(X), 1))
+
+    def lay_out(self, X: np.ndarray) -> np.ndarray:
+        """Return states as they are; see `Model.lay_out`."""
+        return X
 
     def compile(self, w: np.ndarray) -> Any:
         """Compile the policy for a control loop; see `Model.compile`."""

@@ -64,13 +64,18 @@ class InSpace:
         return self.model.n_models
 
     @property
+    def width(self) -> float | np.ndarray | None:
+        """Width of receptive fields; see `Model.width`."""
+        return self.model.width
+
+    @property
     def shares_basis(self) -> bool:
         """Whether all actions share one basis."""
         return self.model.shares_basis
 
     def moments(self, X: np.ndarray, observation: Observation, weights: np.ndarray | None = None) -> Moments:
         """Sum samples up; see `Model.moments`."""
-        return self.model.moments(self._embed(X), observation, weights)
+        return self.model.moments(self.lay_out(X), observation, weights)
 
     def decay(self, moments: Moments) -> Decay:
         """Say what the weight decay acts on; see `Model.decay`."""
@@ -86,27 +91,22 @@ class InSpace:
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy, in units of the scale; see `Model.evaluate`."""
-        return self.model.evaluate(self._embed(X), w)
+        return self.model.evaluate(self.lay_out(X), w)
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
         """Compute second moments about predictions, in units of the scale; see `Model.covariance`."""
-        return self.model.covariance(self._embed(X), P, posterior)
+        return self.model.covariance(self.lay_out(X), P, posterior)
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Compute the features along directions; see `Model.along`."""
-        return self.model.along(self._embed(X), directions)
+        return self.model.along(self.lay_out(X), directions)
 
     def reach(self, X: np.ndarray) -> np.ndarray:
         """Compute how much of a sample reaches each model; see `Model.reach`."""
-        return self.model.reach(self._embed(X))
+        return self.model.reach(self.lay_out(X))
 
-    def compile(self, w: np.ndarray) -> Any:
-        """Compile the policy for a control loop; see `Model.compile`."""
-        from unconstrain.deploy import compiled
-
-        return compiled.InSpace(self.model.compile(w), self.space, self.base, self.scale)
-
-    def _embed(self, X: np.ndarray) -> np.ndarray:
+    def lay_out(self, X: np.ndarray) -> np.ndarray:
+        """Lay states out as features see them; see `Model.lay_out`."""
         if self.space.is_flat:
             return X
         try:
@@ -115,6 +115,12 @@ class InSpace:
             raise DataError(
                 f"some states are no rotation: those that this policy was learnt from are {self.space.words}"
             ) from None
+
+    def compile(self, w: np.ndarray) -> Any:
+        """Compile the policy for a control loop; see `Model.compile`."""
+        from unconstrain.deploy import compiled
+
+        return compiled.InSpace(self.model.compile(w), self.space, self.base, self.scale)
 
 
 def in_units(scale: np.ndarray | None, samples: Samples) -> Samples:

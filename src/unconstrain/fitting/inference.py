@@ -331,6 +331,7 @@ class Inference:
     def _blank(self, risk: str, belief: Belief | None = None) -> Accumulator:
         wanted = self.blank.empty()
         wanted.risk, wanted.belief, wanted.scale = risk, belief, self.scale
+        wanted.finds_region = self.stage == "final" and wanted.finds_region  # it is the same in every pass
         return wanted
 
     def _start(self, done: Accumulator, name: str) -> None:

@@ -128,6 +128,10 @@ class LocalModels:
         """Compute the activations K_m(x); see `Model.reach`."""
         return activations(X, self.centers, self.width)
 
+    def lay_out(self, X: np.ndarray) -> np.ndarray:
+        """Return states as they are; see `Model.lay_out`."""
+        return X
+
     def compile(self, w: np.ndarray) -> Any:
         """Compile the policy for a control loop; see `Model.compile`."""
         from unconstrain.deploy.compiled import LocallyLinear

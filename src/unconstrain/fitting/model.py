@@ -46,6 +46,11 @@ class Model(Protocol):
         ...
 
     @property
+    def width(self) -> float | np.ndarray | None:
+        """Width σ of receptive fields, along each dimension of the states as features see them; None without any."""
+        ...
+
+    @property
     def shares_basis(self) -> bool:
         """Whether all actions share one basis, `Φ(x) = I ⊗ b(x)ᵀ`."""
         ...
@@ -181,6 +186,26 @@ class Model(Protocol):
         -------
         ndarray of shape (N, S)
             Weights, 0 to 1.
+        """
+        ...
+
+    def lay_out(self, X: np.ndarray) -> np.ndarray:
+        """Lay states out as features see them.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, m)
+            In which distances are taken.
+
+        Raises
+        ------
+        DataError
+            Some are no states of the model's space.
         """
         ...
 

@@ -8,6 +8,7 @@ from typing import Any
 from unconstrain.fitting.contact import Tally
 from unconstrain.fitting.corrected import Part
 from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.region import Region
 from unconstrain.motion import NO_MOTION
 
 
@@ -36,6 +37,8 @@ class Sums:
         By fold, of the risk that λ is chosen by where it is another than the one that is minimised.
     tallies : tuple of Tally
         What was found of contact and noise: one, or one for each of several beliefs that are compared.
+    regions : tuple of Region or None
+        By fold: where the samples lie, if that is kept.
     """
 
     moments: tuple[Part | None, ...] = ()
@@ -46,6 +49,7 @@ class Sums:
     shortest: float = math.inf
     judges: tuple[Moments | None, ...] = ()
     tallies: tuple[Tally, ...] = ()
+    regions: tuple[Region | None, ...] = ()
 
     def __add__(self, other: "Sums") -> "Sums":
         return Sums(
@@ -57,6 +61,7 @@ class Sums:
             min(self.shortest, other.shortest),
             _add(self.judges, other.judges),
             _add(self.tallies, other.tallies),
+            _add(self.regions, other.regions),
         )
 
     def rotated(self, by: int, n_folds: int) -> "Sums":
@@ -81,7 +86,12 @@ class Sums:
                 renamed[(fold + by) % n_folds] = part
             return tuple(renamed) if parts else ()
 
-        return replace(self, moments=rename(self.moments), judges=rename(self.judges))
+        return replace(
+            self,
+            moments=rename(self.moments),
+            judges=rename(self.judges),
+            regions=rename(self.regions),
+        )
 
     @property
     def present(self) -> list[Part]:

@@ -4,7 +4,6 @@ import warnings
 from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
@@ -34,6 +33,7 @@ from unconstrain.fitting.model import Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS, Observation, observe
 from unconstrain.fitting.posterior import Posterior
+from unconstrain.fitting.region import Region, find_apart, find_unit, unite
 from unconstrain.motion import moving
 from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
@@ -41,7 +41,8 @@ from unconstrain.spaces import Numbers, Space
 
 if TYPE_CHECKING:
     from unconstrain.deploy.compiled import CompiledPolicy
-    from unconstrain.stability import Stability
+    from unconstrain.stability import Cycle, Stability
+    from unconstrain.stopping import Movement
 
 
 class Policy(RegressorMixin, BaseEstimator):
@@ -58,8 +59,8 @@ class Policy(RegressorMixin, BaseEstimator):
     accumulator_ : Accumulator
         The sums they were solved from. A policy loaded from a file has them only where it was saved with
         `resumable=True`.
-    stability_ : Stability or None
-        What makes the policy end at a goal, in one that `stabilized` returned.
+    stability_ : Stability, Cycle or None
+        What makes the policy end at a goal, or go round and round, in one that `stabilized` returned.
     """
 
     risk: str
@@ -72,7 +73,7 @@ class Policy(RegressorMixin, BaseEstimator):
     accumulator_: Accumulator
     actions_are_scalars_: bool
     n_features_in_: int
-    stability_: "Stability | None" = None
+    stability_: "Stability | Cycle | None" = None
 
     @abstractmethod
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
@@ -248,7 +249,7 @@ class Policy(RegressorMixin, BaseEstimator):
         model = self.place(Z, U.shape[1], weights[counted])
         if not (space.is_flat and scale is None):
             model = InSpace(model, space, base, scale)
-        return Accumulator(model, self.risk, self.alpha, noise=known)
+        return Accumulator(model, self.risk, self.alpha, noise=known, unit=find_unit(Z, model.width))
 
     def resume(self) -> Accumulator:
         """Copy the sums that this policy was solved from, to add to them.
@@ -380,24 +381,28 @@ class Policy(RegressorMixin, BaseEstimator):
         *,
         hold: float | None = None,
     ) -> Self:
-        """Return a policy that ends at a goal, and changes this one's actions as little as that takes.
+        """Return a policy that ends at a goal, or goes round, and changes this one's actions as little as that takes.
 
         A Lyapunov function V, with the goal as its only critical point, is fitted to what this policy does in the
         recorded region. The other policy's actions are this one's wherever they make V fall already, and elsewhere the
         nearest that do; see `unconstrain.stability`.
 
+        With "cycle" a closed curve and the time that each part of it takes are found in the recordings. The other
+        policy's actions are this one's wherever they lead nearer to the curve, at a pace within 5 % of the recorded
+        one, and elsewhere the nearest that do, exactly for actions that are held for `hold`.
+
         Parameters
         ----------
-        goal : array_like of shape (n,), or "end"
+        goal : array_like of shape (n,), "end" or "cycle"
             Where movements end; "end" for the mean of where the episodes of `demos` end. For a policy learnt relative
-            to its goal it is the origin of the states.
+            to its goal it is the origin of the states. "cycle" for movements that go round and round.
         demos : Demonstrations, or array_like of shape (N, n), optional
             What was learnt from, or other states of the region in which movements begin. Without it V is fitted to
             what the policy does at its centres, where it has these.
         hold : float, optional
-            The longest time for which an action is held, in seconds: by default the usual time between the samples of
-            `demos`, or 0.02. V falls over every such step, for which actions are slowed down where they turn too fast
-            for it. `rollout` with a longer `dt` holds them for that.
+            The longest time for which an action is held (for a cycle the time), in seconds: by default the usual time
+            between the samples of `demos`, or 0.02. V falls over every such step, for which actions are slowed down
+            where they turn too fast for it. `rollout` with a longer `dt` holds them for that.
 
         Returns
         -------
@@ -407,7 +412,7 @@ class Policy(RegressorMixin, BaseEstimator):
         Raises
         ------
         DataError
-            The goal is no state, or "end" without demonstrations.
+            The goal is no state, or "end" or "cycle" without demonstrations, or these do not go round and round.
         PolicyError
             Actions are not velocities of the states, or nothing says where the policy was learnt.
         """
@@ -419,7 +424,7 @@ class Policy(RegressorMixin, BaseEstimator):
         return stable
 
     def held_for(self, seconds: float) -> Self:
-        """Return this policy for actions that are held for a time, where that is longer than it was made stable for.
+        """Return this policy for actions that are held for a time, where it was made stable for another.
 
         Parameters
         ----------
@@ -429,13 +434,18 @@ class Policy(RegressorMixin, BaseEstimator):
         Returns
         -------
         Policy
-            This one where it is not stabilised, or for as long already.
+            This one where it is not stabilised.
+
+        Raises
+        ------
+        PolicyError
+            Nothing that is held for so long can follow its cycle.
         """
-        if self.stability_ is None or seconds <= self.stability_.hold:
+        if self.stability_ is None:
             return self
-        slower = copy(self)
-        slower.stability_ = replace(self.stability_, hold=float(seconds))
-        return slower
+        held = copy(self)
+        held.stability_ = self.stability_.held_for(float(seconds))
+        return held
 
     def posterior(self) -> Posterior:
         """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
@@ -502,6 +512,69 @@ class Policy(RegressorMixin, BaseEstimator):
         scaled = self.model_.evaluate(X, self.solution_.w)
         posterior = self.posterior() if posterior is None else posterior
         return self._in_own_units(self.model_.covariance(X, scaled, posterior))
+
+    def distance(self, X: ArrayLike) -> np.ndarray:
+        """Compute how far states lie from those that were learnt from.
+
+        Recorded states are kept as the boxes of a grid that they lie in, few enough for a small file.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N,)
+            From the nearest box, in `distance_unit_`; zero for every state that was learnt from.
+
+        Raises
+        ------
+        DataError
+            The states are not finite or not of the dimension learnt.
+        """
+        check_is_fitted(self)
+        return self.region().distance(self.model_.lay_out(check_states(self, X)))
+
+    def region(self) -> Region:
+        """Return where the states that were learnt from lie, as features see them.
+
+        Returns
+        -------
+        Region
+            At most 512 boxes.
+        """
+        check_is_fitted(self)
+        return unite(self.solution_.regions)
+
+    def usual_distance(self) -> float:
+        """Compute how far a movement may lead from recorded states until it leaves what was recorded.
+
+        Returns
+        -------
+        float
+            As far as recordings lead from each other: half of the folds of `alpha="cv"` lead farther from all others.
+            At least one, in `distance_unit_`.
+        """
+        check_is_fitted(self)
+        return max(1.0, find_apart(self.solution_.regions))
+
+    def usual_speed(self) -> float:
+        """Compute the root mean square length of the actions learnt from, in units of `scale_`.
+
+        Returns
+        -------
+        float
+            Above zero.
+
+        Raises
+        ------
+        PolicyError
+            The policy was saved without its sums.
+        """
+        moments = self.resume().moments()
+        whole = moments if moments.everywhere is None else moments.everywhere
+        return float(np.sqrt(np.sum(whole.squares) / np.sum(whole.weight)))
 
     def free_probability(
         self,
@@ -614,7 +687,9 @@ class Policy(RegressorMixin, BaseEstimator):
         constraint: Any = None,
         *,
         stop_when: Callable[[np.ndarray], ArrayLike] | None = None,
-    ) -> Demonstrations:
+        beyond: float | None = None,
+        limits: Any = None,
+    ) -> "Movement":
         """Follow the policy through time, freely or under a constraint; see `simulation.rollout`.
 
         Parameters
@@ -628,12 +703,18 @@ class Policy(RegressorMixin, BaseEstimator):
         constraint : array_like of shape (k, n) or callable, optional
             Rows `A` with `A u = 0`, or a function that returns them for states (S, n).
         stop_when : callable, optional
-            Is given the current states (S, n); where it says true for any of them the movement ends.
+            Is given the current states (S, n); where it says true a movement ends.
+        beyond : float, optional
+            How far from recorded states a movement may lead before it is stopped, in `distance_unit_`; by default
+            `usual_distance`, infinite for anywhere. A stabilised policy may lead anywhere, since it leads back.
+        limits : sequence of n pairs, or mapping from str to pairs, optional
+            The least and the largest value that each state may have, or by name of those that have limits.
 
         Returns
         -------
-        Demonstrations
-            States, actions and time of every movement.
+        Movement
+            Demonstrations: states, actions and time of every movement. Its `stopped` says which had to stop, where and
+            why, of which there is a warning too.
 
         Raises
         ------
@@ -642,7 +723,7 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         from unconstrain.simulation import rollout
 
-        return rollout(self, start, steps, dt, constraint, stop_when=stop_when)
+        return rollout(self, start, steps, dt, constraint, stop_when=stop_when, beyond=beyond, limits=limits)
 
     def save(self, path: str | PathLike[str], *, resumable: bool = False) -> None:
         """Write the policy to a file that `load_policy` reads. Nothing in it is code.
@@ -687,9 +768,11 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         step = self.model_.compile(self.solution_.w)
         if self.stability_ is not None:
-            from unconstrain.deploy.compiled import Stabilized
+            from unconstrain.deploy.compiled import Cyclic, Stabilized
+            from unconstrain.stability import Cycle
 
-            step = Stabilized(step, self.stability_)
+            stable = self.stability_
+            step = Cyclic(step, stable) if isinstance(stable, Cycle) else Stabilized(step, stable)
         step.check_agreement(self.predict)
         return step
 
@@ -800,6 +883,11 @@ class Policy(RegressorMixin, BaseEstimator):
         """What a length of one is along each action, (d,): ones, unless `scale` or the states say otherwise."""
         scale = self.model_.scale
         return np.ones(self.n_actions_) if scale is None else scale
+
+    @property
+    def distance_unit_(self) -> str:
+        """What `distance` counts in: widths of receptive fields, or, of a policy without these, half the spread."""
+        return "half-spreads" if self.model_.width is None else "receptive fields"
 
     @property
     def alpha_(self) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
+from unconstrain.fitting.region import Region
 from unconstrain.policies.base import Policy
 from unconstrain.storage import Kind, load_object, save_object
 
@@ -69,3 +70,7 @@ def _check_usable(policy: Policy) -> None:
         raise TypeError(f"its actions have shape {actions.shape}")
     if not np.isfinite(actions).all():
         raise ValueError("its actions are not finite")
+    regions = [each for each in policy.solution_.regions if each is not None]
+    if not regions or not all(isinstance(each, Region) for each in regions):
+        raise TypeError("it does not say where it was recorded")
+    policy.distance(policy.space_.origin[None])  # raises for the region of another space

@@ -1,4 +1,4 @@
-"""A policy made to end at a goal: which goal, and where it was learnt."""
+"""A policy made to end at a goal, or to go round and round: which goal, and where it was learnt."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -10,13 +10,16 @@ from unconstrain.arrays import check_number, check_numbers, check_states, quote
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.spaces import Space
-from unconstrain.stability import Stability
+from unconstrain.stability import Cycle, Stability
 
 if TYPE_CHECKING:
     from unconstrain.policies.base import Policy
 
 END = "end"
 """What a goal may be besides a state: the mean of where episodes end."""
+
+CYCLE = "cycle"
+"""What a goal may be for movements that go round and round."""
 
 HOLD = 0.02
 """For how many seconds an action is held where recordings do not say."""
@@ -33,14 +36,14 @@ MEAN_PASSES = 10
 
 def learn_stability(
     policy: "Policy", goal: Any, demos: "Demonstrations | ArrayLike | None", hold: float | None
-) -> Stability:
+) -> Stability | Cycle:
     """Learn what makes a policy end at a goal.
 
     Parameters
     ----------
     policy : Policy
         Fitted, not stabilised.
-    goal : array_like of shape (n,) or "end"
+    goal : array_like of shape (n,), "end" or "cycle"
         Where movements end.
     demos : Demonstrations, array_like of shape (N, n), or None
         The recorded region; None for the policy's own centres.
@@ -49,7 +52,7 @@ def learn_stability(
 
     Returns
     -------
-    Stability
+    Stability or Cycle
         For this goal.
 
     Raises
@@ -58,11 +61,13 @@ def learn_stability(
         As for `Policy.stabilized`.
     """
     space = policy.space_
+    if isinstance(goal, str) and goal == CYCLE:
+        return _learn_cycle(policy, demos, hold)
     X = _find_centers(policy) if demos is None else _find_states(policy, demos)
     if isinstance(goal, str):
         if goal != END:
             raise DataError(
-                f'a goal is a state, or "end" for the mean of where episodes end, not {quote(goal)}'
+                f'a goal is a state, "end" for the mean of where episodes end, or "cycle", not {quote(goal)}'
             )
         if not isinstance(demos, Demonstrations):
             raise DataError(
@@ -71,17 +76,36 @@ def learn_stability(
         at, apart = find_end(demos, space, policy.scale_)
     else:
         at, apart = _check_goal(goal, space), None
+    hold = _check_hold(demos, hold)
+    U = np.reshape(policy.predict(X), (len(X), -1))
+    stability = Stability.learn(space, at, policy.scale_, X, U, hold)
+    notes = [_describe_change(stability, X, U, "lead towards the goal")]
+    if apart is not None and isinstance(demos, Demonstrations):
+        notes.insert(0, _describe_end(demos.n_episodes, apart, stability.extent))
+    return replace(stability, notes=tuple(notes))
+
+
+def _learn_cycle(policy: "Policy", demos: Any, hold: float | None) -> Cycle:
+    """Learn what makes a policy go round and round."""
+    if not isinstance(demos, Demonstrations) or demos.time is None:
+        raise DataError(
+            'a cycle is found in demonstrations with their times: give these, stabilized("cycle", demos), or fit with '
+            "--stable-at cycle and --time on the command line"
+        )
+    X = _find_states(policy, demos)
+    hold = _check_hold(demos, hold)
+    cycle = Cycle.learn(policy.space_, policy.scale_, X, demos.episodes, demos.time, hold)
+    U = np.reshape(policy.predict(X), (len(X), -1))
+    return replace(cycle, notes=(*cycle.notes, _describe_change(cycle, X, U, "keep to the cycle")))
+
+
+def _check_hold(demos: Any, hold: float | None) -> float:
     if hold is None:
         hold = _find_step(demos) if isinstance(demos, Demonstrations) else HOLD
     hold = check_number(hold, "hold", positive=True)
     if hold > LONGEST_HOLD:
         raise PolicyError(f"hold must be at most {LONGEST_HOLD:g} seconds, got {hold:g}")
-    U = np.reshape(policy.predict(X), (len(X), -1))
-    stability = Stability.learn(space, at, policy.scale_, X, U, hold)
-    notes = [_describe_change(stability, X, U)]
-    if apart is not None and isinstance(demos, Demonstrations):
-        notes.insert(0, _describe_end(demos.n_episodes, apart, stability.extent))
-    return replace(stability, notes=tuple(notes))
+    return hold
 
 
 def _describe_end(episodes: int, apart: float, extent: float) -> str:
@@ -93,7 +117,7 @@ def _describe_end(episodes: int, apart: float, extent: float) -> str:
     )
 
 
-def _describe_change(stability: Stability, X: np.ndarray, U: np.ndarray) -> str:
+def _describe_change(stability: Stability | Cycle, X: np.ndarray, U: np.ndarray, how: str) -> str:
     """Say by how much actions (N, d) in the recorded region are changed."""
     changed = (stability.stabilize(X, U) - U) / stability.scale
     stays = float(
@@ -102,7 +126,7 @@ def _describe_change(stability: Stability, X: np.ndarray, U: np.ndarray) -> str:
     change, speed = (float(np.sqrt(np.mean(np.sum(A**2, axis=1)))) for A in (changed, U / stability.scale))
     share = f", {change / speed:.2g} of their usual length" if speed else ""
     return (
-        f"in the recorded region {stays:.0%} of the actions lead towards the goal as they are; all together are "
+        f"in the recorded region {stays:.0%} of the actions {how} as they are; all together are "
         f"changed by {change:.3g} (root mean square){share}"
     )
 

@@ -20,6 +20,7 @@ from unconstrain.fitting.accumulator import Accumulator, Record
 from unconstrain.fitting.contact import Belief, Tally
 from unconstrain.fitting.corrected import CorrectedMoments
 from unconstrain.fitting.inference import Inference
+from unconstrain.fitting.region import Region
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
 from unconstrain.recordings.notes import Note
@@ -163,6 +164,8 @@ def _check_sums(sums: Sums) -> None:
             np.isfinite(each).all() for each in (part.H, part.g, part.squares, part.weight)
         ):
             raise TypeError("its sums are not finite")
+    if not all(each is None or isinstance(each, Region) for each in sums.regions):
+        raise TypeError("it does not say where samples lie")
     sums + Sums()  # raises for counts that are none
     _check_types(sums.tallies, tuple[Tally, ...])
 

@@ -1,7 +1,7 @@
 """The smallest change of an action that makes a Lyapunov function fall, in closed form."""
 
-from dataclasses import dataclass
-from typing import Any, Self
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -72,6 +72,9 @@ class Stability:
     hold: float
     notes: tuple[str, ...] = ()
 
+    is_kept_under_constraints: ClassVar[bool] = True
+    """Whether states cannot run away where a constraint takes part of an action."""
+
     @classmethod
     def learn(cls, space: Space, goal: Array, scale: Array, X: Array, U: Array, hold: float) -> Self:
         """Learn V from a policy's actions.
@@ -138,6 +141,21 @@ class Stability:
         lyapunov = learn_lyapunov(E, U, wanted, space.blocks)
         extent = float(np.linalg.norm(np.ptp(E, axis=0)))
         return cls(space, goal, scale, lyapunov, pace, radius, pull, extent, hold)
+
+    def held_for(self, seconds: float) -> Self:
+        """Return this for actions that are held for a time, where that is longer.
+
+        Parameters
+        ----------
+        seconds : float
+            Above zero.
+
+        Returns
+        -------
+        Stability
+            For at least that long.
+        """
+        return self if seconds <= self.hold else replace(self, hold=seconds)
 
     def stabilize(self, X: Array, U: Array, projections: Array | None = None) -> Array:
         """Change actions as little as it takes to make V fall.

@@ -33,6 +33,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.fitting.in_space": ("InSpace",),
     "unconstrain.fitting.inference": ("Inference", "Run"),
     "unconstrain.fitting.noise": ("Noise", "Squares"),
+    "unconstrain.fitting.region": ("Region",),
     "unconstrain.constraints.learnt.constant": ("ConstantConstraint",),
     "unconstrain.constraints.learnt.feature": ("FeatureConstraint",),
     "unconstrain.constraints.learnt.jacobian": ("JacobianFeatures",),
@@ -44,6 +45,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.spaces.product": ("Pose", "Product"),
     "unconstrain.spaces.rotation": ("Rotation",),
     "unconstrain.spaces.second_order": ("SecondOrder",),
+    "unconstrain.stability.cycle": ("Cycle",),
     "unconstrain.stability.lyapunov": ("Lyapunov",),
     "unconstrain.stability.stabilizing": ("Stability",),
     "sklearn.compose": ("ColumnTransformer",),
@@ -75,6 +77,7 @@ _CIRCUMSTANCES = ("memory", "n_jobs")
 LARGEST_EXPANSION = 10**6
 """How many columns a transformer may make of one state, at most."""
 MOST_FOLDS = 1000
+COARSEST = 1000
 
 
 def names() -> tuple[str, ...]:
@@ -206,9 +209,23 @@ def _plausible_corrected(state: Mapping[str, Any]) -> bool:
     )
 
 
+def _plausible_region(state: Mapping[str, Any]) -> bool:
+    unit, boxes, coarseness = (state[name] for name in ("unit", "boxes", "coarseness"))
+    return (
+        type(coarseness) is int
+        and 0 <= coarseness <= COARSEST
+        and boxes.ndim == 2
+        and len(boxes) > 0
+        and unit.shape == boxes.shape[1:]
+        and bool((unit > 0).all())
+        and all(math.isfinite(each.sum()) for each in (unit, boxes))
+    )
+
+
 _CHECKS: Mapping[str, Callable[[Mapping[str, Any]], bool]] = {
     "CorrectedMoments": _plausible_corrected,
     "EpisodeFolds": _plausible_folds,
     "PolynomialFeatures": _plausible_polynomials,
+    "Region": _plausible_region,
     "SplineTransformer": _plausible_splines,
 }

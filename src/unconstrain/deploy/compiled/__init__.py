@@ -12,7 +12,7 @@ A compiled policy is of one of five kinds, named by what it evaluates. b are nor
 | additive  | Σ_j f_j(x_j), f_j of polynomials  | breaks (n, K), origins (n, K+1), polynomials (n, K+1, degree+1, d)  |
 
 `InSpace` is one of these behind what a space makes of the state, and before a scale. `Stabilized` is any of them, and
-the smallest change of its actions that leads to a goal.
+the smallest change of its actions that leads to a goal; `Cyclic` that which keeps to a cycle.
 
 On one state the cost is that of entering NumPy. So arrays are laid out for each step to be one call, intermediate
 results go to buffers that each thread has for itself, and the largest activation is taken out of the others only far
@@ -22,6 +22,7 @@ away from all centres, where they would underflow otherwise.
 from unconstrain.deploy.compiled.additive import Additive
 from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, RadialBasis
+from unconstrain.deploy.compiled.cyclic import Cyclic
 from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
 from unconstrain.deploy.compiled.loading import load_compiled
@@ -30,6 +31,7 @@ from unconstrain.deploy.compiled.stabilized import Stabilized
 __all__ = [
     "Additive",
     "CompiledPolicy",
+    "Cyclic",
     "InSpace",
     "Linear",
     "LocallyLinear",

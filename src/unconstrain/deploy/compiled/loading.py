@@ -5,6 +5,7 @@ from os import PathLike
 from unconstrain.deploy.compiled.additive import Additive
 from unconstrain.deploy.compiled.base import CompiledPolicy
 from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, RadialBasis
+from unconstrain.deploy.compiled.cyclic import CYCLE_ARRAYS, Cyclic
 from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
 from unconstrain.deploy.compiled.stabilized import STABLE_ARRAYS, Stabilized
@@ -38,11 +39,14 @@ def load_compiled(path: str | PathLike[str]) -> CompiledPolicy:
     """
     tree, arrays = read(path, Kind.COMPILED_POLICY)
     try:
-        about, stable = tree.get("space"), tree.get("stable")
+        about, stable, cycle = (tree.get(name) for name in ("space", "stable", "cycle"))
         others = (SPACE_ARRAYS if about is not None else ()) + (STABLE_ARRAYS if stable is not None else ())
+        others += CYCLE_ARRAYS if cycle is not None else ()
         step = KINDS[tree["kind"]](**{name: array for name, array in arrays.items() if name not in others})
         if about is not None:
             step = InSpace.restore(step, about, arrays)
+        if cycle is not None:
+            step = Cyclic.restore(step, cycle, arrays)
         return step if stable is None else Stabilized.restore(step, stable, arrays)
     except (UnconstrainError, ValueError, TypeError, KeyError, AttributeError) as error:
         reason = str(error) if isinstance(error, UnconstrainError) else "its arrays are not those of a policy"

@@ -25,6 +25,21 @@ def test_a_learnt_constraint_is_told_to_what_was_recorded_under_it(run, tmp_path
     code, out, err = run("diagnose", "wiped.npz", *told)
     assert code == 0, err
     assert "verdict: " in out
+    movement = (
+        "policy.skops",
+        "--start=0,0,0",
+        "--steps",
+        50,
+        "--constraint",
+        "table.skops",
+        "--beyond",
+        "anywhere",
+    )
+    code, out, err = run("rollout", *movement)
+    assert code == 0, err
+    path = np.loadtxt("rollout.csv", delimiter=",", skiprows=1, usecols=(1, 2, 3))
+    assert np.allclose(path @ [0.6, 0, 0.8], 0)
+    assert np.ptp(path[:, 1]) > 0.1
     code, _, err = run("fit", "free.npz", *told, "--out", "other.skops")
     assert code == 2
     assert (

@@ -21,6 +21,8 @@ STOPPED = 3
 ANYWHERE = "anywhere"
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
 
     from unconstrain.demonstrations import Demonstrations
@@ -52,6 +54,12 @@ if TYPE_CHECKING:
     type=Numbers(),
     multiple=True,
     help='A row of the constraint A, A u = 0: --block="1,0,0". May be given several times.',
+)
+@click.option(
+    "--constraint",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A constraint that `unconstrain constraints` saved, under which it moves.",
 )
 @click.option(
     "--goal",
@@ -91,6 +99,7 @@ def rollout(
     steps: int,
     dt: float,
     block: tuple[list[float], ...],
+    constraint: Path | None,
     goal: list[float] | None,
     stable_at: list[float] | str | None,
     stop_when_unsure: float | None,
@@ -105,7 +114,8 @@ def rollout(
     POLICY was saved by `unconstrain fit`. A movement that leaves what was recorded, or its limits, or diverges, stops
     there: what was reached is written, and the exit code is 3.
     """
-    outputs.check_outputs([policy], {"out": out, "figure": figure}, overwrite=overwrite)
+    read = [policy] if constraint is None else [policy, constraint]
+    outputs.check_outputs(read, {"out": out, "figure": figure}, overwrite=overwrite)
     import numpy as np
 
     from unconstrain import plot
@@ -130,13 +140,16 @@ def rollout(
         held = Limits(limiting.read_limits(limits, names), names, None if frame is None else frame.out_of)
     if frame is not None:
         begin, rows = frame.into(begin[None])[0], frame.constraint_into(rows)
+    barred: Any = rows if len(rows) else None
+    if constraint is not None:
+        barred = _constrain(learnt, constraint, rows, frame)
     if unsure is not None and unsure.starting_at(begin):
         known = _unsure_at(unsure, begin)
         reporting.say(f"note: at the start, as it was recorded, {known}; it may not become less sure")
     with working("rolling out"), warnings.catch_warnings():
         warnings.simplefilter("ignore", MovementStopped)  # which is said below
         movement = integrate(
-            *(learnt, begin, steps, dt, rows if len(rows) else None),
+            *(learnt, begin, steps, dt, barred),
             stop_when=unsure,
             beyond=math.inf if isinstance(beyond, str) else beyond,
             limits=held,
@@ -167,6 +180,33 @@ def rollout(
     reporting.say(f"movement: {out}\nfigure: {figure}")
     if stop is not None:
         click.get_current_context().exit(STOPPED)
+
+
+def _constrain(
+    learnt: "Policy", path: Path, rows: "np.ndarray", frame: "Frame | None"
+) -> "Callable[[np.ndarray], np.ndarray]":
+    """Make a function of states of the rows of a constraint in a file, and of those that hold everywhere."""
+    import numpy as np
+
+    from unconstrain.constraints.learnt import load_constraint
+
+    known = load_constraint(path)
+    n, d = known.n_features_in_, known.n_actions_
+    if (n, d) != (learnt.n_features_in_, learnt.n_actions_):
+        raise DataError(
+            f"the constraint is over {n} states and {d} actions, and the policy over {learnt.n_features_in_} and "
+            f"{learnt.n_actions_}: learn it from the same columns"
+        )
+    if frame is not None and not frame.space.is_flat:
+        raise DataError(
+            "constraint= is for states of which none is a rotation, or a policy that is relative to nothing"
+        )
+
+    def rows_at(X: np.ndarray) -> np.ndarray:
+        own = known.rows(X if frame is None else frame.out_of(X))
+        return np.concatenate([own, np.broadcast_to(rows, (len(X), *rows.shape))], axis=1)
+
+    return rows_at
 
 
 def _stabilize(learnt: "Policy", goal: list[float] | str, frame: "Frame | None") -> "Policy":

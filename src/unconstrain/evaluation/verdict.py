@@ -136,16 +136,12 @@ def _list_objections(found: Findings) -> list[str]:
             "diagnose` says where and what to record next"
         )
     following = found.following
-    if following is not None and following.n_left:
+    if following is not None and following.n_stopped:
         where = (
-            f"from {following.n_left} of {following.n_starts} recorded starts it "
-            f"{'diverges' if following.n_diverged else 'leaves what was recorded'}, first after "
-            f"{following.first_left:.2g} s"
+            f"from {following.n_stopped} of {following.n_starts} recorded starts it leaves what was recorded, first "
+            f"after {following.first:.2g} s"
         )
-        remedy = (
-            "" if found.is_stabilized else " (stable_at=end makes it end at the goal, where there is one)"
-        )
-        against.append(where + remedy)
+        against.append(where if found.is_stabilized else f"{where} ({_describe_remedy(found)})")
     return against
 
 

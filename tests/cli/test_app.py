@@ -151,7 +151,7 @@ def test_what_goes_wrong_anywhere_is_one_sentence(run, movements, monkeypatch, r
     def fail(*args, **kwargs):
         raise raised
 
-    monkeypatch.setattr("unconstrain.comparison.select_policy", fail)
+    monkeypatch.setattr("unconstrain.evaluation.comparison.select_policy", fail)
     ended, _, err = run("fit", movements, *COLUMNS)
     assert ended == code
     assert err.startswith(sentence)

@@ -107,7 +107,7 @@ def test_the_printed_rollout_starts_where_the_recording_does(run, tmp_path):
     assert np.abs(np.array(start.split(","), dtype=float) - far[0]).max() < 1e-3 * np.ptp(far, axis=0).max()
     for _ in range(2):
         code, _, err = run(*command[1:])
-        assert code == 0, err
+        assert code in (0, 3), err  # 3 where ten seconds lead beyond what was recorded
 
 
 @pytest.mark.parametrize("where", ["a full disk", "a closed pipe"])

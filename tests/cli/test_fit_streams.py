@@ -156,7 +156,7 @@ def test_ctrl_c_says_how_to_go_on(run, folder, monkeypatch):
         (("--free", "u9"), "no column 'u9' for free"),
         (
             ("--free", "x0", "--risk", "direct"),
-            "leave out --risk direct, or else --force, --free and --projections",
+            "leave out --risk direct, or else --force, --free, --projections and --constraint",
         ),
         (("--figure", "a.png", "--cluster", "local"), "--figure needs all data in memory"),
         (("--model", "auto", "--checkpoint", "a.npz"), "--model auto needs all data in memory"),

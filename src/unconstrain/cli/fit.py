@@ -139,10 +139,7 @@ def fit(
     if figure is not None:
         reporting.say(f"figure: {figure}")
     to = recorded.columns.relative_to
-    if evaluation.verdict.is_of_use:
-        _suggest(out, demos, needs_goal=to is not None and to != START)
-    else:
-        reporting.say(f"policy: {out}")
+    _suggest(out, demos if evaluation.verdict.is_of_use else None, needs_goal=to is not None and to != START)
 
 
 def _suggest(out: Path, demos: "Demonstrations | None" = None, *, needs_goal: bool = False) -> None:
@@ -155,10 +152,23 @@ def _suggest(out: Path, demos: "Demonstrations | None" = None, *, needs_goal: bo
         start = ",".join(reporting.shown_number(*pair) for pair in zip(first, scales, strict=True))
         # The start is one of those learnt from, so it is relative already, to a goal at the origin.
         goal = f' --goal="{",".join(f"{x:g}" for x in demos.space.origin)}"' if needs_goal else ""
+        steps, dt = _find_steps(demos)
         reporting.say(
             f'  unconstrain rollout {reporting.shell_word(out)} --start="{start}"{goal} '
-            "--steps 500 --dt 0.02 --overwrite"
+            f"--steps {steps} --dt {dt:g} --overwrite"
         )
+
+
+def _find_steps(demos: "Demonstrations") -> tuple[int, float]:
+    """Return how many steps the first episode takes, and how long they are (s)."""
+    if demos.time is None:
+        return 500, 0.02
+    time = demos.time[demos.episodes == demos.episodes[0]]
+    duration = float(time[-1] - time[0])
+    if duration <= 0:
+        return 500, 0.02
+    dt = float(f"{duration / (len(time) - 1):.2g}")
+    return max(1, round(duration / dt)), dt
 
 
 def _fit_stream(

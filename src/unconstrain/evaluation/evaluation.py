@@ -85,14 +85,26 @@ class Evaluation:
         return next(each for each in self.scores if each.name.startswith(REGRESSION))
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return the cells of the table, as text, under `COLUMNS`."""
+        """List the cells of the table under `COLUMNS`.
+
+        Returns
+        -------
+        list of tuple of str
+            A row an episode, then one a policy.
+        """
         rows = [_cells(each) for each in self.episodes]
         if self.n_more:
             rows.append((f"... {self.n_more} more", *[""] * (len(COLUMNS) - 1)))
         return [*rows, *(_cells(each) for each in self.scores)]
 
     def sentences(self) -> list[str]:
-        """Return what is to be said below the table, the verdict last."""
+        """List what is to be said below the table.
+
+        Returns
+        -------
+        list of str
+            Remarks, and the verdict last.
+        """
         said = list(self.remarks)
         if math.isfinite(self.free_rmse) and self.policy.free < 1:
             said.append(f"root mean square error of the action where samples were free: {self.free_rmse:.4g}")
@@ -192,7 +204,7 @@ def evaluate(
     >>> from unconstrain.limit_cycle import demonstrate
     >>> policy = uc.ParametricPolicy(uc.NormalizedRBF()).fit(demonstrate(20, random_state=0))
     >>> found = uc.evaluate(policy, demonstrate(5, random_state=1))
-    >>> found.policy.shown > 0.99 > 0.9 > found.regression.shown
+    >>> found.policy.shown > 0.97 > 0.7 > found.regression.shown
     True
     """
     if not isinstance(policy, Policy):

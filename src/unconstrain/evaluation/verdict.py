@@ -26,10 +26,10 @@ class Findings:
     explained, regression : float
         Share explained of what held-out recordings show, by the policy and by ordinary regression; NaN where nothing
         moves or it is not known.
-    typical : float
-        The same of the policy, of the middle one of the episodes; NaN where there is one alone.
     held_out : str
         What they are, in words: "held-out episodes", "these recordings".
+    typical : float
+        The same of the policy, of the middle one of the episodes; NaN where there is one alone.
     free : float or None
         Share of samples inferred to be free; None where it was not inferred.
     known : float

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from reproduction.experiments import EXPERIMENTS, find_experiment
+from reproduction.real.parts import PARTS
 from unconstrain.cli import reporting
 from unconstrain.cli.command import Command, Group, Interrupted
 
@@ -239,7 +240,45 @@ def stability(data: Path, repetitions: int, shape: tuple[str, ...], figure: Path
         console.print(f"written: {figure}", soft_wrap=True)
 
 
+@click.command("real", cls=Command)
+@click.argument("data", type=PATH, metavar="DATA_FOLDER")
+@click.option("--part", multiple=True, type=click.Choice(list(PARTS)), help="Not all; may be repeated.")
+@click.option(
+    "--repetitions",
+    type=COUNT,
+    default=10,
+    show_default=True,
+    help="How often what is drawn at random is drawn.",
+)
+@click.option(
+    "--out",
+    type=PATH,
+    default=FOLDER / "real",
+    show_default=True,
+    help="Folder for results. Finished repetitions are kept there, and the same command goes on from them.",
+)
+def real(data: Path, part: tuple[str, ...], repetitions: int, out: Path) -> None:
+    """Learn from recordings of people: handwriting, reaching among boxes, wiping, lids.
+
+    DATA_FOLDER holds handwriting/*.mat, reaching/*.mat and wiping/*.mat; what is missing is left out.
+    """
+    from rich.markdown import Markdown
+
+    from reproduction.real.page import run_parts
+
+    console = _console()
+    outcomes = run_parts(data, part or list(PARTS), repetitions, out, console.print)
+    for outcome in outcomes:
+        console.print(Markdown(f"## {outcome.title}\n\n{outcome.table}"))
+        for sentence in outcome.findings:
+            console.print(f"  - {sentence}")
+        for path in outcome.figures:
+            console.print(f"written: {path}", soft_wrap=True)
+    console.print(f"written: {out / 'real.md'}", soft_wrap=True)
+
+
 program.add_command(run_all)
+program.add_command(real)
 program.add_command(stability)
 program.add_command(view)
 

@@ -1,0 +1,1 @@
+"""Recordings of people and robots, whose policy nobody knows, measured part by part."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         ConstantConstraint,
         ConstraintChain,
         FeatureConstraint,
+        MechanismConstraint,
         NullspaceComponent,
         load_constraint,
     )
@@ -42,6 +43,7 @@ __all__ = [
     "FeatureConstraint",
     "Inspection",
     "LocallyLinearPolicy",
+    "MechanismConstraint",
     "NormalizedRBF",
     "NullspaceComponent",
     "ParametricPolicy",
@@ -73,6 +75,7 @@ _HOMES = {
         "ConstantConstraint",
         "ConstraintChain",
         "FeatureConstraint",
+        "MechanismConstraint",
         "NullspaceComponent",
         "load_constraint",
     ),

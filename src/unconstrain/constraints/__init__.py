@@ -12,6 +12,7 @@ themselves are in `unconstrain.constraints.learnt`.
 from unconstrain.constraints.contacts import contact
 from unconstrain.constraints.forces import from_forces
 from unconstrain.constraints.measured import first_known, from_flags, from_jacobian, from_normals
+from unconstrain.constraints.mechanisms import Mechanism, find_mechanism
 from unconstrain.constraints.nullspace import (
     NEGLIGIBLE_ROW,
     RANK_TOLERANCE,
@@ -24,8 +25,10 @@ from unconstrain.constraints.recorded import from_recording
 __all__ = [
     "NEGLIGIBLE_ROW",
     "RANK_TOLERANCE",
+    "Mechanism",
     "combine",
     "contact",
+    "find_mechanism",
     "first_known",
     "from_flags",
     "from_forces",

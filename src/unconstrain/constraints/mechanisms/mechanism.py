@@ -19,6 +19,9 @@ Places = Literal["one", "each"]
 LEAST_GAIN = 5.0
 """A less simple mechanism, or several places, have to be better by this logarithm of the odds, 150 to 1."""
 
+LEAST_SURE = 0.5
+"""A hinge whose place is less sure than this share of its radius has an axis of which only the direction is told."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -193,7 +196,10 @@ class Mechanism:
         direction, place = self.uncertainty
         parts = [f"of the direction {np.degrees(direction):.2g}°"] if self.shapes[0].direction.any() else []
         parts += [f"of the place {place:.2g}"] if self.kind not in ("prismatic", "plane") else []
-        return f"  how sure: standard error {', '.join(parts)}"
+        said = f"  how sure: standard error {', '.join(parts)}"
+        if self.kind == "hinge" and place > LEAST_SURE * self.shapes[0].radius:
+            said += ": the arc is too short to tell where the axis is"
+        return said
 
     def _turned_words(self, number: int | None) -> str:
         if not self.turned:

@@ -138,8 +138,8 @@ def _say(
         said.append(
             f"Its axis points along ({axis}), standard error {np.degrees(push.uncertainty[0]):.0f}°. Arcs of "
             f"{angles.min():.0f}° to {angles.max():.0f}° hardly tell where it is: radius "
-            f"{100 * push.shapes[0].radius:.0f} cm, standard error of the place {100 * push.uncertainty[1]:.0f} cm, and {_count_against(pushed, push)} of "
-            f"{pushed.n_episodes} arcs curve the other way than most."
+            f"{100 * push.shapes[0].radius:.0f} cm, standard error of the place {100 * push.uncertainty[1]:.0f} cm, "
+            f"and {_count_against(pushed, push)} of {pushed.n_episodes} arcs curve the other way than most."
         )
     reached = "reached" if push.kind == "hinge" else "missed"
     said.append(f"The lid is named {push.kind}: {reached} (target: hinge with its axis).")

@@ -175,9 +175,11 @@ def draw(folder: Path, wipes: list[Wipe]) -> Figure:
             Q = demos.states[wipe.rows]
             (line,) = ax.plot(Q[:, 0], Q[:, 2], linewidth=1.2)
             middle, normal = Q.mean(axis=0), wipe.axes[2] * np.sign(wipe.axes[2, 2])
-            ax.annotate(
-                "", middle[[0, 2]] + 0.08 * normal[[0, 2]], middle[[0, 2]],
-                arrowprops={"arrowstyle": "->", "color": line.get_color()},
-            )  # fmt: skip
+            force = wipe.force / np.linalg.norm(wipe.force) * np.sign(wipe.force[2])
+            for way, style in ((normal, "-"), (force, ":")):
+                ax.annotate(
+                    "", middle[[0, 2]] + 0.08 * way[[0, 2]], middle[[0, 2]],
+                    arrowprops={"arrowstyle": "->", "color": line.get_color(), "linestyle": style},
+                )  # fmt: skip
         ax.set(xlabel="x (m)", ylabel="z (m)", title=f"{name} no. {number}", aspect="equal")
     return figure

@@ -32,6 +32,8 @@ class Wipe:
         Standard deviations of the points along the plane's axes, in metres, the largest first.
     axes : ndarray of shape (3, 3)
         Those axes as rows; the last is the normal.
+    force : ndarray of shape (3,)
+        Mean force, without weight, bias and what lies along the motion.
     angles : dict
         Angles in degrees between the normal and the mean force, by what was done to the force.
     friction : Friction
@@ -47,6 +49,7 @@ class Wipe:
     end: float
     spread: Array
     axes: Array
+    force: Array
     angles: dict[str, float]
     friction: Friction
     strokes: int
@@ -79,9 +82,8 @@ def find_wipes(folder: Path) -> tuple[Payload, list[Wipe]]:
     for name in SURFACES:
         demos = read(folder, name).demos
         f = clean[name]
-        usable = np.isfinite(f).all(axis=1)
         touching, _ = constraints.contact(
-            np.where(usable[:, None], f, 0.0), THRESHOLD, release=RELEASE, episodes=demos.episodes
+            np.nan_to_num(f), THRESHOLD, release=RELEASE, episodes=demos.episodes
         )
         assert demos.time is not None
         for code, label in enumerate(demos.episode_labels):
@@ -119,7 +121,7 @@ def _measure(folder: Path, name: str, label: str, rows: NDArray[np.intp], f: Arr
     }
     return Wipe(
         name, label, rows, float(demos.time[rows[0]]), float(demos.time[rows[-1]]), values / np.sqrt(len(P)), axes,
-        angles, constraints.find_friction(f, V, RELEASE), _turns(V @ axes[0]),
+        frictionless.mean(axis=0), angles, constraints.find_friction(f, V, RELEASE), _turns(V @ axes[0]),
     )  # fmt: skip
 
 

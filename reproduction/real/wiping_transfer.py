@@ -74,12 +74,11 @@ def project(folder: Path) -> dict[str, Array]:
     told = {}
     for name in SURFACES:
         demos, f = read(folder, name).demos, clean[name]
-        known = np.isfinite(f).all(axis=1)
         N = constraints.from_forces(
-            np.where(known[:, None], f, 0.0), THRESHOLD, release=RELEASE, actions=demos.actions, window=WINDOW,
+            np.nan_to_num(f), THRESHOLD, release=RELEASE, actions=demos.actions, window=WINDOW,
             episodes=demos.episodes,
         )  # fmt: skip
-        N[~known] = np.nan
+        N[np.isnan(f[:, 0])] = np.nan
         told[name] = N
     return told
 

@@ -42,7 +42,7 @@ def move(kind, rng):
     return Q
 
 
-def record(kind, episodes=3, noise=1e-3, seed=0):
+def record(kind, episodes=2, noise=1e-3, seed=0):
     """Positions and episodes of several movements."""
     rng = np.random.default_rng(seed)
     P = np.concatenate([move(kind, rng) for _ in range(episodes)])
@@ -68,14 +68,14 @@ def test_a_mechanism_is_named_in_any_frame_and_unit(kind):
 def test_the_projections_let_through_what_the_mechanism_does():
     P, episodes = record("hinge", noise=0.0)
     U = np.gradient(P, axis=0)
-    inside = np.tile((TIMES > 0.05) & (TIMES < 0.95), 3)
+    inside = np.tile((TIMES > 0.05) & (TIMES < 0.95), 2)
     N = uc.constraints.find_mechanism(P, episodes=episodes).projections(P)
     assert np.einsum("nij,nj->ni", N, U)[inside] == pytest.approx(U[inside], abs=1e-4)
     assert np.trace(N, axis1=1, axis2=2) == pytest.approx(1.0)
 
 
 def test_a_door_that_was_moved_is_at_a_place_in_each_episode():
-    P, episodes = record("hinge")
+    P, episodes = record("hinge", episodes=3)
     P = P + np.array([[0.0, 0.0, 0.0], [0.3, 0.2, 0.0], [-0.2, 0.5, 0.1]])[episodes]
     found = uc.constraints.find_mechanism(P, episodes=episodes)
     assert (found.kind, found.places, len(found.shapes)) == ("hinge", "each", 3)

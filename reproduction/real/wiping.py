@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from reproduction.markdown import table
 from reproduction.real.part import Outcome
 from reproduction.real.wiping_contacts import CLEAN, FRICTIONLESS, RAW, TURNED, Wipe, find_wipes
-from reproduction.real.wiping_recordings import SURFACES, read
+from reproduction.real.wiping_recordings import RELEASE, SURFACES, THRESHOLD, read
 from reproduction.real.wiping_transfer import (
     DIRECT,
     INFERRED,
@@ -18,6 +18,7 @@ from reproduction.real.wiping_transfer import (
     STROKE,
     TOLD,
     WAYS,
+    Error,
     compare,
 )
 from unconstrain import plot
@@ -25,6 +26,9 @@ from unconstrain.constraints import Payload
 
 TARGET = 10.0
 """Degrees between normals."""
+CLEARLY = 0.005
+OTHER_THRESHOLDS = ((8.0, 6.0), (10.0, 8.0), (14.0, 12.0))
+PLACES = ("position", "position relative to the start")
 AWAY = (("rim", "fender"), ("fender", "rim"))
 
 
@@ -62,7 +66,16 @@ def run(folder: Path, repetitions: int, out: Path, progress: Callable[[str], Non
 def tabulate_wipes(wipes: list[Wipe]) -> str:
     """Write a line for each phase of wiping."""
     ways = (RAW, TURNED, CLEAN, FRICTIONLESS)
-    header = ["surface", "no.", "wipe (s)", "extent (mm, s.d.)", "turns", *ways, "μ, and what it explains"]
+    header = [
+        "surface",
+        "no.",
+        "wipe (s)",
+        "extent (mm, s.d.)",
+        "turns",
+        *ways,
+        "the hand's axis",
+        "μ, and what it explains",
+    ]
     rows = [
         [
             wipe.surface,
@@ -71,26 +84,31 @@ def tabulate_wipes(wipes: list[Wipe]) -> str:
             " x ".join(f"{1e3 * each:.0f}" for each in wipe.spread),
             str(wipe.strokes),
             *(f"{wipe.angles[way]:.1f}°" for way in ways),
+            f"{wipe.hand:.1f}°",
             f"{wipe.friction.coefficient:+.2f} ± {wipe.friction.uncertainty:.2f}, {wipe.friction.explained:.0%}",
         ]
         for wipe in wipes
     ]
     middle = [f"{np.median([wipe.angles[way] for wipe in wipes]):.1f}°" for way in ways]
-    rows.append(["median", "", "", "", "", *middle, ""])
+    rows.append(["median", "", "", "", "", *middle, f"{np.median([wipe.hand for wipe in wipes]):.1f}°", ""])
     return table(header, rows)
 
 
-def tabulate_errors(errors: dict[tuple[str, str, str, str], float]) -> str:
+def tabulate_errors(errors: dict[tuple[str, str, str, str], Error]) -> str:
     """Write a line for each state and way, with a column for each pair of surfaces."""
     header = ["state", "way", "rim, held out", "fender, held out", "rim → fender", "fender → rim"]
     rows = [
-        [state, way, *(f"{errors[state, way, learnt, tried]:.2f}" for learnt, tried in PAIRS)]
+        [state, way, *(_both(errors[state, way, learnt, tried]) for learnt, tried in PAIRS)]
         for state in (*STATES, STROKE)
         for way in WAYS
         if (state, way, *PAIRS[0]) in errors
     ]
     rows.append(["any", "standing still", *["1.00"] * len(PAIRS)])
     return table(header, rows)
+
+
+def _both(error: Error) -> str:
+    return f"{error.whole:.2f}" + ("" if error.under is None else f" ({error.under:.2f})")
 
 
 def _say_forces(folder: Path, payload: Payload, wipes: list[Wipe]) -> list[str]:
@@ -123,6 +141,23 @@ def _say_forces(folder: Path, payload: Payload, wipes: list[Wipe]) -> list[str]:
         f"phases, the furthest {max(wipe.angles[FRICTIONLESS] for wipe in wipes):.1f}°: "
         f"{'reached' if within == n else 'missed'} (target: all within {TARGET:.0f}°)."
     )
+    others = []
+    for threshold, release in OTHER_THRESHOLDS:
+        angles = [wipe.angles[FRICTIONLESS] for wipe in find_wipes(folder, threshold, release)[1]]
+        close = sum(angle <= TARGET for angle in angles)
+        others.append(f"{close} of {len(angles)} with {threshold:g} and {release:g} N")
+    said.append(
+        f"Contact begins at {THRESHOLD:g} N and ends below {RELEASE:g} N, chosen by eye. Other thresholds: "
+        f"{', '.join(others)}."
+    )
+    leaning = [wipe for wipe in wipes if wipe.angles[FRICTIONLESS] > TARGET]
+    if leaning:
+        said.append(
+            "Where the force leans furthest from the normal of the plane, so does the hand that presses, by "
+            f"{min(wipe.hand for wipe in leaning):.0f}° to {max(wipe.hand for wipe in leaning):.0f}°; force and hand "
+            f"are {min(wipe.apart for wipe in leaning):.0f}° to {max(wipe.apart for wipe in leaning):.0f}° apart "
+            "there. Either the surface is no plane within the wipe, or the pad passes on what the hand presses."
+        )
     turns = {name: [wipe.strokes for wipe in wipes if wipe.surface == name] for name in SURFACES}
     said.append(
         f"The two are different movements: on the rim the hand turns round {min(turns['rim'])} to {max(turns['rim'])} "
@@ -132,33 +167,34 @@ def _say_forces(folder: Path, payload: Payload, wipes: list[Wipe]) -> list[str]:
     return said
 
 
-def _say_transfer(errors: dict[tuple[str, str, str, str], float]) -> list[str]:
+def _say_transfer(errors: dict[tuple[str, str, str, str], Error]) -> list[str]:
     said = []
     ahead = [
         state
         for state in STATES
         if all(
-            min(errors[state, way, *pair] for way in (TOLD, INFERRED) if (state, way, *pair) in errors)
-            < errors[state, DIRECT, *pair] - 5e-3
+            min(errors[state, way, *pair].whole for way in (TOLD, INFERRED) if (state, way, *pair) in errors)
+            < errors[state, DIRECT, *pair].whole - CLEARLY
             for pair in AWAY
         )
     ]
-    own = min(errors["position", way, "rim", "rim"] for way in WAYS)
+    own = min(errors[state, way, "rim", "rim"].whole for state in PLACES for way in WAYS)
+    other = min(errors[state, way, "fender", "fender"].whole for state in PLACES for way in WAYS)
     said.append(
         "Carried over to the other surface, policies told by force or inferred are better than direct ones in both "
         f"directions for {ahead[0] if ahead else 'no state'}: {'reached' if ahead else 'missed'} (target: above direct "
         "in both directions)."
     )
     said.append(
-        f"Held out on the surface it was learnt on, a policy of position makes {own:.2f} of the squared error of "
-        "standing still at best (rim): position does not explain wiping, which is known before another surface is "
-        "tried."
+        f"Held out on the surface they were learnt on, policies of position make {own:.2f} (rim) and {other:.2f} "
+        "(fender) of the squared error of standing still at best: position does not explain wiping, which is known "
+        "before another surface is tried."
     )
-    stroke = [errors[STROKE, DIRECT, *pair] for pair in PAIRS]
+    stroke = [errors[STROKE, DIRECT, *pair].whole for pair in PAIRS]
     said.append(
-        "What explains wiping is place and speed along the stroke, in the stroke's own amplitude and frequency: "
-        f"{stroke[0]:.2f} held out on the rim, {stroke[1]:.2f} on the fender; but {stroke[2]:.2f} and {stroke[3]:.2f} "
-        "across, as a scrub is no single stroke."
+        "What explains wiping is place and speed along the stroke, in amplitudes and periods that are read off each "
+        f"wipe itself: {stroke[0]:.2f} held out on the rim, {stroke[1]:.2f} on the fender; but {stroke[2]:.2f} and "
+        f"{stroke[3]:.2f} across, as a scrub is no single stroke."
     )
     return said
 

@@ -36,6 +36,8 @@ class Wipe:
         Mean force, without weight, bias and what lies along the motion.
     angles : dict
         Angles in degrees between the normal and the mean force, by what was done to the force.
+    hand, apart : float
+        Angles in degrees of the hand's own axis to the normal, and to the mean force without friction.
     friction : Friction
         As estimated.
     strokes : int
@@ -51,6 +53,8 @@ class Wipe:
     axes: Array
     force: Array
     angles: dict[str, float]
+    hand: float
+    apart: float
     friction: Friction
     strokes: int
 
@@ -63,13 +67,17 @@ RAW, TURNED, CLEAN, FRICTIONLESS = (
 )
 
 
-def find_wipes(folder: Path) -> tuple[Payload, list[Wipe]]:
+def find_wipes(
+    folder: Path, threshold: float = THRESHOLD, release: float = RELEASE
+) -> tuple[Payload, list[Wipe]]:
     """Find the phases of wiping on both surfaces.
 
     Parameters
     ----------
     folder : Path
         Of recordings.
+    threshold, release : float
+        Of contact, in newtons.
 
     Returns
     -------
@@ -77,13 +85,13 @@ def find_wipes(folder: Path) -> tuple[Payload, list[Wipe]]:
         The weight and the biases.
     wipes : list of Wipe
     """
-    payload, clean = clean_forces(folder)
+    payload, clean = clean_forces(folder, threshold)
     wipes = []
     for name in SURFACES:
         demos = read(folder, name).demos
         f = clean[name]
         touching, _ = constraints.contact(
-            np.nan_to_num(f), THRESHOLD, release=RELEASE, episodes=demos.episodes
+            np.nan_to_num(f), threshold, release=release, episodes=demos.episodes
         )
         assert demos.time is not None
         for code, label in enumerate(demos.episode_labels):
@@ -119,14 +127,17 @@ def _measure(folder: Path, name: str, label: str, rows: NDArray[np.intp], f: Arr
             (FRICTIONLESS, frictionless.mean(axis=0)),
         )
     }
+    hand = surface.rotations[rows][:, :, 2].mean(axis=0)
+    begin, end = demos.time[rows[[0, -1]]].tolist()
+    force = frictionless.mean(axis=0)
     return Wipe(
-        name, label, rows, float(demos.time[rows[0]]), float(demos.time[rows[-1]]), values / np.sqrt(len(P)), axes,
-        frictionless.mean(axis=0), angles, constraints.find_friction(f, V, RELEASE), _turns(V @ axes[0]),
+        name, label, rows, begin, end, values / np.sqrt(len(P)), axes, force, angles, _angle(hand, axes[2]),
+        _angle(hand, force), constraints.find_friction(f, V, RELEASE), _turns(V @ axes[0]),
     )  # fmt: skip
 
 
-def _angle(mean: Array, normal: Array) -> float:
-    return float(np.degrees(np.arccos(abs(mean @ normal) / np.linalg.norm(mean))))
+def _angle(a: Array, b: Array) -> float:
+    return float(np.degrees(np.arccos(abs(a @ b) / (np.linalg.norm(a) * np.linalg.norm(b)))))
 
 
 def _turns(speed: Array) -> int:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 SURFACES = ("rim", "fender")
 FILES = "wiping/demos_{}_processed_data.mat"
 THRESHOLD, RELEASE = 12.0, 10.0
-"""Newtons. Chosen on rim no. 6, where hands that lead the arm are felt up to 8 N, and wiping from 12 N."""
+"""Newtons. Chosen by eye on these recordings: the hand that leads the arm is felt up to 8 N, wiping from 12 N."""
 MARGIN = 20
 """Samples beside a contact that are not taken for free, 0.2 s."""
 
@@ -73,13 +73,15 @@ def read(folder: Path, name: str) -> Surface:
     return Surface(name, demos, rotations, constraints.find_stuck(demos.forces, episodes=demos.episodes))
 
 
-def clean_forces(folder: Path) -> tuple[constraints.Payload, dict[str, Array]]:
+def clean_forces(folder: Path, threshold: float = THRESHOLD) -> tuple[constraints.Payload, dict[str, Array]]:
     """Take weight and bias out of the forces: one weight on both surfaces, and a bias in each episode.
 
     Parameters
     ----------
     folder : Path
         Of recordings.
+    threshold : float
+        Of contact, in newtons.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def clean_forces(folder: Path) -> tuple[constraints.Payload, dict[str, Array]]:
     R = np.concatenate([surface.rotations for surface in surfaces])
     first = surfaces[0].demos.n_episodes
     episodes = np.concatenate([surfaces[0].demos.episodes, surfaces[1].demos.episodes + first])
-    payload = constraints.find_payload(F, R, THRESHOLD, episodes=episodes, margin=MARGIN)
+    payload = constraints.find_payload(F, R, threshold, episodes=episodes, margin=MARGIN)
     f = payload.remove(F, R, episodes=episodes)
     f[np.concatenate([surface.stuck for surface in surfaces])] = np.nan
     parts = np.split(f, [len(surfaces[0].demos)])

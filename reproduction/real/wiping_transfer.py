@@ -44,6 +44,22 @@ STROKE = "place and speed along the stroke of each wipe, in its own amplitudes a
 
 
 @dataclass(frozen=True)
+class Error:
+    """Mean squared errors of the whole action, as shares of what standing still would make.
+
+    Parameters
+    ----------
+    whole : float
+        Of the policy's action.
+    under : float or None
+        Of what the surface leaves of the policy's action where the force tells the constraint; None where none is told.
+    """
+
+    whole: float
+    under: float | None
+
+
+@dataclass(frozen=True)
 class Samples:
     """What one surface gives to learn from, or to be tried on.
 
@@ -115,15 +131,8 @@ def along_strokes(folder: Path, name: str, wipes: list[Wipe]) -> Samples:
 
 def compare(
     folder: Path, wipes: list[Wipe], progress: Callable[[str], None]
-) -> dict[tuple[str, str, str, str], float]:
-    """Measure errors of the whole action by state, way, and surfaces learnt and tried on.
-
-    Returns
-    -------
-    dict
-        Mean squared error as a share of what standing still would make, 1 for the floor. On the surface learnt from,
-        of episodes (or wipes) held out.
-    """
+) -> dict[tuple[str, str, str, str], Error]:
+    """Measure errors by state, way, and surfaces learnt and tried on; on the same, of episodes (or wipes) held out."""
     told = project(folder)
     errors = {}
     for state in (*STATES, STROKE):
@@ -141,14 +150,14 @@ def compare(
     return errors
 
 
-def _try(learnt: Samples, tried: Samples, way: str) -> float:
+def _try(learnt: Samples, tried: Samples, way: str) -> Error:
     if learnt is not tried:
-        return _error(_predict(learnt, tried, way), tried.actions)
+        return _error(_predict(learnt, tried, way), tried)
     predicted = np.empty_like(tried.actions)
     for label in np.unique(learnt.groups):
         own = learnt.groups == label
         predicted[own] = _predict(learnt.take(~own), learnt.take(own), way)
-    return _error(predicted, tried.actions)
+    return _error(predicted, tried)
 
 
 def _predict(learnt: Samples, tried: Samples, way: str) -> Array:
@@ -165,5 +174,13 @@ def _predict(learnt: Samples, tried: Samples, way: str) -> Array:
     return np.asarray(policy.predict(tried.states)).reshape(tried.actions.shape)
 
 
-def _error(P: Array, U: Array) -> float:
-    return float(np.sum((U - P) ** 2) / np.sum(U**2))
+def _error(P: Array, tried: Samples) -> Error:
+    U, N = tried.actions, tried.projections
+    still = float(np.sum(U**2))
+    under = None
+    if N is not None:
+        known = ~np.isnan(N[:, 0, 0])
+        left = P.copy()
+        left[known] = np.einsum("nij,nj->ni", N[known], P[known])
+        under = float(np.sum((U - left) ** 2)) / still
+    return Error(float(np.sum((U - P) ** 2)) / still, under)

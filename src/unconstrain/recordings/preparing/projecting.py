@@ -22,6 +22,11 @@ def make_projections(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     made = from_forces_and_flags(rows.forces, rows.free, rows.U, rows.codes, force_threshold=threshold)
     notes = []
     if rows.forces is not None:
+        text = (
+            "forces are taken along the axes of the actions; where the sensor turns with the hand, projections= takes "
+            "what constraints.find_payload and constraints.from_forces make of them"
+        )
+        notes.append(Note("guess", recording.name, text))
         stuck = find_stuck(rows.forces, episodes=rows.codes)
         within = len(np.unique(rows.codes[stuck]))
         text = (

@@ -110,7 +110,7 @@ class Friction:
     Parameters
     ----------
     coefficient : float
-        μ: friction as a share of the force across the motion. Below zero where forces push along more than they oppose.
+        Friction as a share of the force across the motion. Below zero where forces push along more than they oppose.
     uncertainty : float
         Its standard error, by leaving out a tenth of the contact at a time.
     explained : float

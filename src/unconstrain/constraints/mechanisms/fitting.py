@@ -46,6 +46,7 @@ class Fit:
         Parameters
         ----------
         P : ndarray of shape (N, d)
+            Points.
         place : int
             Which of the shapes.
         noise, extent : float
@@ -63,6 +64,7 @@ class Fit:
         Parameters
         ----------
         P : ndarray of shape (N, d)
+            Points.
         place : int
             Which of the shapes.
         noise, extent : float
@@ -89,6 +91,7 @@ def fit_shape(kind: Kind, places: Sequence[Array], noise: float, extent: float) 
     Parameters
     ----------
     kind : {"prismatic", "hinge", "plane", "sphere", "cylinder"}
+        Which.
     places : sequence of ndarray of shape (N, d)
         Points of two or three dimensions at each place. Only a line and a hinge may have several.
     noise, extent : float

@@ -101,6 +101,7 @@ class Mechanism:
         Parameters
         ----------
         positions : array_like of shape (N, d)
+            Of the hand.
         episodes : array_like of shape (N,), optional
             Needed where the mechanism is at another place in each; in the order in which they were given.
 
@@ -139,6 +140,7 @@ class Mechanism:
         Parameters
         ----------
         positions : array_like of shape (N, d)
+            Of the hand.
         episodes : array_like of shape (N,), optional
             As for `rows`.
 

@@ -44,6 +44,7 @@ class Shape:
         Parameters
         ----------
         P : ndarray of shape (N, d)
+            Points.
 
         Returns
         -------
@@ -69,6 +70,7 @@ class Shape:
         Parameters
         ----------
         P : ndarray of shape (N, d)
+            Points.
 
         Returns
         -------

@@ -65,6 +65,23 @@ def test_a_mechanism_is_named_in_any_frame_and_unit(kind):
     assert shape.radius == pytest.approx(radius, rel=0.02)
 
 
+@pytest.mark.parametrize(("P", "words"), [
+    (np.ones((50, 3)), "do not move"),
+    (np.random.default_rng(0).normal(size=(5, 3)), "too few to tell a mechanism"),
+    (np.full((50, 3), np.nan), "NaN or infinity in row 0"),
+    (np.zeros((50, 7)), r"\(samples, 3\)"),
+])  # fmt: skip
+def test_what_is_no_movement_is_a_sentence(P, words):
+    with pytest.raises(DataError, match=words):
+        uc.constraints.find_mechanism(P)
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e200])
+def test_exact_lines_of_any_size_are_lines(size):
+    line = size * np.outer(TIMES, [0.0, 1.0, 0.0])
+    assert uc.constraints.find_mechanism(line).kind == "prismatic"
+
+
 def test_the_projections_let_through_what_the_mechanism_does():
     P, episodes = record("hinge", noise=0.0)
     U = np.gradient(P, axis=0)

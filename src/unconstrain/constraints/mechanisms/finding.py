@@ -32,6 +32,11 @@ MOST_NOISE = 0.03
 POINTS, MOST_POINTS = 50, 600
 """Points of an episode, evenly along its path, and of all episodes."""
 LEAST_POINTS = 12
+MOST_EPISODES = 50
+"""Of more episodes so many are used, evenly, and a mechanism at another place in each is not looked for."""
+TOO_SHORT = (
+    f"no episode has {LEAST_POINTS} points along its path, too few to tell a mechanism: give longer movements"
+)
 FOLDS = 5
 ORDER: tuple[tuple[Kind, Places], ...] = (
     ("prismatic", "one"), ("plane", "one"), ("sphere", "one"), ("cylinder", "one"), ("hinge", "one"),
@@ -87,22 +92,27 @@ def find_mechanism(
     """
     P, R = _check(positions, rotations)
     each = split_episodes(episodes, len(P))
+    # In the middle of the points and in their size nothing over- or underflows, wherever they are and in any unit.
+    middle = P.mean(axis=0)
+    size = float(np.abs(P - middle).max(initial=0.0))
+    if not 0.0 < size < np.inf:
+        raise DataError("the positions do not move, or beyond all bounds: there is no mechanism to be told")
+    P = (P - middle) / size
     extent, sensor = _measure(P, each)
     if play is None:
         play = max(PLAY * extent, min(sensor, MOST_NOISE * extent))
     else:
-        play = check_number(play, "play", positive=True)
+        play = check_number(play, "play", positive=True) / size
     thinned = _thin(P, each, sensor)
     if not thinned:
-        raise DataError(
-            f"no episode has {LEAST_POINTS} points along its path, so that no mechanism can be told: give longer "
-            "movements"
-        )
+        raise DataError(TOO_SHORT)
+    if len(thinned) > MOST_EPISODES:
+        thinned = [thinned[i] for i in np.linspace(0, len(thinned) - 1, MOST_EPISODES).round().astype(int)]
     problem = _Problem(P, R, [own for own, _ in thinned], play, extent)
     compared: dict[tuple[str, Places], Array] = {("none", "one"): np.zeros((len(problem.each), FOLDS))}
     for kind, places in ORDER:
         curve = kind in ("prismatic", "hinge")
-        if (P.shape[1] == 3 or curve) and (places == "one" or len(problem.each) > 1):
+        if (P.shape[1] == 3 or curve) and (places == "one" or 1 < len(each) <= MOST_EPISODES):
             gain = problem.hold_out(kind, places)
             if gain is not None:
                 compared[kind, places] = gain
@@ -115,9 +125,10 @@ def find_mechanism(
         candidates.append(Candidate(name, at, likelihood, float(lag.sum()), scatter, distance))
     chosen = _choose(candidates)
     candidates.sort(key=lambda c: c.behind)
-    return problem.describe(
+    found = problem.describe(
         chosen.kind, chosen.places, tuple(candidates), [label for _, label in thinned], len(each)
     )
+    return found.moved(middle, size)
 
 
 def _choose(candidates: list[Candidate]) -> Candidate:
@@ -269,14 +280,16 @@ def _check(positions: ArrayLike, rotations: ArrayLike | None) -> tuple[Array, Ar
 def _measure(P: Array, each: list[Rows]) -> tuple[float, float]:
     """Measure how far a movement leads, the median over episodes, and the noise of the positions."""
     extents, jumps = [], []
-    for own in each:
+    for own in (own for own in each if len(own) >= LEAST_POINTS):
         centred = P[own] - P[own].mean(axis=0)
         along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
         extents.append(np.ptp(along))
         jumps.append(np.linalg.norm(np.diff(P[own], n=3, axis=0), axis=1))
+    if not extents:
+        raise DataError(TOO_SHORT)
     extent = float(np.median(extents))
-    if not extent > 0 or not np.isfinite(extent):
-        raise DataError("the positions do not move: there is no mechanism to be told")
+    if not extent > 0:
+        raise DataError("most episodes do not move: there is no mechanism to be told")
     third = np.concatenate(jumps)
     # Noise makes third differences of √20 times its size in each component; their norm has a median of √(d - 0.65).
     sensor = float(np.median(third)) / np.sqrt(20.0 * (P.shape[1] - 0.65)) if len(third) else 0.0

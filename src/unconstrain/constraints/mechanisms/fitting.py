@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 TURNS, SETTLED = 12, 1e-3
 STEPS, TRIES, CONVERGED = 50, 8, 1e-6
+LEAST_STIFF, LEAST_DAMPING = 1e-6, 1e-6
+"""Parameters that change nothing, as the radius of a straight arc, are held by this share of the others."""
 LARGEST_RADIUS = 20.0
 """In extents of the movement: an arc of three degrees. What is less curved is straight."""
 LEAST_OUTSIDE, MOST_OUTSIDE = 0.01, 0.1
@@ -210,9 +212,10 @@ def _refine(
             return None, np.inf
         J, move = _linearize(shapes, places, roots, extent)
         H, g = J.T @ J, J.T @ r
-        scale = np.diag(np.diag(H) + 1e-12 * np.trace(H))
+        scale = np.diag(np.diag(H) + LEAST_STIFF * np.trace(H))
         for _ in range(TRIES):
-            new = move(np.asarray(-np.linalg.solve(H + damping * scale, g), dtype=np.float64))
+            step = np.linalg.lstsq(H + damping * scale, -g, rcond=None)[0]
+            new = move(np.asarray(step, dtype=np.float64))
             r_new = distances(new)
             cost_new = float(r_new @ r_new)
             if cost_new < cost:
@@ -220,7 +223,13 @@ def _refine(
             damping *= 10.0
         else:
             break
-        gained, shapes, r, cost, damping = cost - cost_new, new, r_new, cost_new, damping / 10.0
+        gained, shapes, r, cost, damping = (
+            cost - cost_new,
+            new,
+            r_new,
+            cost_new,
+            max(damping / 10.0, LEAST_DAMPING),
+        )
         if gained <= CONVERGED * cost:
             break
     upright = _upright(shapes[0].direction)

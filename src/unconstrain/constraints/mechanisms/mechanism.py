@@ -1,7 +1,7 @@
 """A mechanism that was found: its kind, where it is, how sure that is, and what else would nearly do."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -94,6 +94,34 @@ class Mechanism:
     turned: tuple[float, ...]
     uncertainty: tuple[float, float]
     hand: str = ""
+
+    def moved(self, middle: Array, size: float) -> "Mechanism":
+        """Return the same mechanism in another unit and elsewhere.
+
+        Parameters
+        ----------
+        middle : ndarray of shape (d,)
+            Where the origin comes to lie.
+        size : float
+            What a length of one becomes.
+
+        Returns
+        -------
+        Mechanism
+            All else is the same.
+        """
+        return replace(
+            self,
+            shapes=tuple(
+                replace(shape, point=size * shape.point + middle, radius=size * shape.radius)
+                for shape in self.shapes
+            ),
+            candidates=tuple(replace(each, distance=size * each.distance) for each in self.candidates),
+            extent=size * self.extent,
+            play=size * self.play,
+            distance=size * self.distance,
+            uncertainty=(self.uncertainty[0], size * self.uncertainty[1]),
+        )
 
     def rows(self, positions: ArrayLike, episodes: ArrayLike | None = None) -> Array:
         """Compute constraint rows A with ``A v = 0`` for the velocities v that the mechanism lets through.

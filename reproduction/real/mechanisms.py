@@ -64,6 +64,9 @@ def run(folder: Path, repetitions: int, out: Path, progress: Callable[[str], Non
         episode="episode",
     )
     found["reaches among boxes"] = find_mechanism(reaches.states, episodes=reaches.episodes)
+    alone = [
+        find_mechanism(reaches.episode(code).states).kind != "none" for code in range(reaches.n_episodes)
+    ]
     letters = {}
     for path in sorted((folder / "handwriting").glob("*.mat")):
         progress(f"mechanisms: handwriting, {path.stem}")
@@ -74,7 +77,7 @@ def run(folder: Path, repetitions: int, out: Path, progress: Callable[[str], Non
     return Outcome(
         "Lid (hinge), and other mechanisms",
         tabulate(found, letters),
-        tuple(_say(lid, pushed, found, letters)),
+        (*_say(lid, pushed, found, letters), _say_alone(alone)),
         (picture,),
     )
 
@@ -161,6 +164,16 @@ def _say(
         f"{f' ({chr(44).join(named)})' if named else ''}: {'missed' if named else 'reached'} (target: none)."
     )
     return said
+
+
+def _say_alone(alone: list[bool]) -> str:
+    """Say how many single movements are given a mechanism."""
+    n = sum(alone)
+    return (
+        f"Of {len(alone)} reaches, each by itself, {n} are given a mechanism, with the remark that it was found in a "
+        "single movement, and that one made freely lies near some line, arc or surface as well: "
+        f"{'missed' if n else 'reached'} (target: none)."
+    )
 
 
 def _count_against(pushed: Demonstrations, push: Mechanism) -> int:

@@ -79,7 +79,9 @@ def test_what_is_no_movement_is_a_sentence(P, words):
 @pytest.mark.parametrize("size", [1e-200, 1e200])
 def test_exact_lines_of_any_size_are_lines(size):
     line = size * np.outer(TIMES, [0.0, 1.0, 0.0])
-    assert uc.constraints.find_mechanism(line).kind == "prismatic"
+    found = uc.constraints.find_mechanism(line)
+    assert found.kind == "prismatic"
+    assert "record several" in found.describe("xyz")
 
 
 def test_the_projections_let_through_what_the_mechanism_does():

@@ -217,7 +217,17 @@ class _Problem:
         fit = self.fits.get((kind, places))
         if fit is None:
             return Mechanism(
-                "none", "one", (), candidates, self.extent, self.play, 0.0, np.nan, (), (np.nan, np.nan)
+                "none",
+                "one",
+                (),
+                candidates,
+                self.extent,
+                self.play,
+                0.0,
+                np.nan,
+                (),
+                (np.nan, np.nan),
+                len(self.each),
             )
         turned, words = [], []
         for number, own in enumerate(self.each):
@@ -235,7 +245,7 @@ class _Problem:
         on, uncertainty = self._distance_on(fit, places), _jackknife(self.parts[kind, places], fit)
         return Mechanism(
             kind, places, shapes, candidates, self.extent, self.play, 1.0 - fit.outside, on, tuple(turned), uncertainty,
-            words[0] if words else "",
+            len(self.each), words[0] if words else "",
         )  # fmt: skip
 
 

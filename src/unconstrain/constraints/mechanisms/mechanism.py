@@ -19,6 +19,7 @@ Places = Literal["one", "each"]
 LEAST_GAIN = 5.0
 """A less simple mechanism, or several places, have to be better by this logarithm of the odds, 150 to 1."""
 
+SINGLE = "  found in a single movement, and one made freely lies near some line, arc or surface as well: record several"
 LEAST_SURE = 0.5
 """A hinge whose place is less sure than this share of its radius has an axis of which only the direction is told."""
 
@@ -79,6 +80,8 @@ class Mechanism:
     uncertainty : tuple of float
         Standard error of the direction in radians, and of the place in the unit of the positions, by leaving out
         points.
+    n_movements : int
+        Episodes it was found in.
     hand : str
         How the hand turned, where rotations were given.
     """
@@ -93,6 +96,7 @@ class Mechanism:
     distance: float
     turned: tuple[float, ...]
     uncertainty: tuple[float, float]
+    n_movements: int
     hand: str = ""
 
     def moved(self, middle: Array, size: float) -> "Mechanism":
@@ -218,6 +222,8 @@ class Mechanism:
             label = f"episode {labels[number] if len(labels) else number + 1}: " if several else ""
             lines.append(f"  {label}{shape.describe(names)}{self._turned_words(number if several else None)}")
         lines.append(self._sure_words())
+        if self.n_movements == 1:
+            lines.append(SINGLE)
         if self.hand:
             lines.append(f"  {self.hand}")
         return "\n".join([*lines, *self._others()])

@@ -18,5 +18,17 @@ def _run(module: str) -> Run:
 PARTS = {
     "handwriting": Part("Handwriting (LASA)", ("handwriting/*.mat",), _run("handwriting")),
     "reaching": Part("Reaching among boxes (CLAMP)", ("reaching/reaching_cluttered.mat",), _run("reaching")),
+    "wiping": Part("Wiping on two surfaces (rim, fender)", ("wiping/demos_*.mat",), _run("wiping")),
+    "mechanisms": Part(
+        "Lid (hinge), and other mechanisms",
+        (
+            "reaching/box_closing.mat",
+            "reaching/reaching_cluttered.mat",
+            "planer_circle.csv",
+            "curve_circle.csv",
+            "handwriting/*.mat",
+        ),
+        _run("mechanisms"),
+    ),
 }
 """By the name that `--part` takes, in the order of the page."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         ConstantConstraint,
         ConstraintChain,
         FeatureConstraint,
+        MechanismConstraint,
         NullspaceComponent,
         load_constraint,
     )
@@ -44,6 +45,7 @@ __all__ = [
     "FeatureConstraint",
     "Inspection",
     "LocallyLinearPolicy",
+    "MechanismConstraint",
     "NormalizedRBF",
     "NullspaceComponent",
     "ParametricPolicy",
@@ -76,6 +78,7 @@ _HOMES = {
         "ConstantConstraint",
         "ConstraintChain",
         "FeatureConstraint",
+        "MechanismConstraint",
         "NullspaceComponent",
         "load_constraint",
     ),

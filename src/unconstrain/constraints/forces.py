@@ -2,13 +2,13 @@
 
 An ideal contact does no work, so its force is a constraint row: ``f·v = 0`` for the velocity v of the point that is
 touched. What a sensor measures is noisy, flickers about any threshold as contact is made and broken, and contains
-friction. Hence four steps:
+friction. Where a sensor had stopped (`stuck`) nothing is known. Else, four steps:
 
 1. a running median takes out spikes and keeps the edges of contacts, which a mean would smear (`filtering`);
 2. contact is told by two thresholds (`contacts`);
 3. the part of the force along the motion is friction, which does work, and is taken out (`friction`). Where less than
    half of the force is left (it lies within 30° of the motion) this is no contact that blocks the motion, and its
-   constraint is left unknown;
+   constraint is left unknown. With a coefficient of friction that is known, no more is taken out than that;
 4. within a contact, and never across its ends, what is left is averaged over the window, which steadies its direction.
 """
 
@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain.arrays import check_whole
 from unconstrain.constraints.contacts import check_forces, detect_contact, near_change
 from unconstrain.constraints.filtering import running_median, split_episodes
-from unconstrain.constraints.friction import directions_of_motion, remove_along
+from unconstrain.constraints.friction import check_friction, directions_of_motion, remove_along
 from unconstrain.constraints.measured import check_jacobians, from_normals
+from unconstrain.constraints.stuck import detect_stuck
+from unconstrain.errors import DataError
 
 FRICTION = 0.5
 """Share of the measured force that has to be at right angles to the motion: that of friction coefficients up to √3."""
@@ -35,6 +37,7 @@ def from_forces(
     window: int = 5,
     margin: int = 0,
     episodes: ArrayLike | None = None,
+    friction: float | None = None,
 ) -> NDArray[np.float64]:
     """Compute projections from measured contact forces: the identity out of contact, and across the force in contact.
 
@@ -58,6 +61,9 @@ def from_forces(
         over, where they were differentiated.
     episodes : array_like of shape (N,), optional
         Nothing is filtered across episodes, and what is said of one does not depend on the others.
+    friction : float, optional
+        Coefficient of friction, such as `find_friction` estimates; needs actions. By default all of the force along the
+        motion is taken for friction.
 
     Returns
     -------
@@ -74,11 +80,17 @@ def from_forces(
     each = split_episodes(episodes, len(F))
     along = None if actions is None else directions_of_motion(actions, F, J, each)
     blocking = F if along is None else remove_along(F, along)
+    if friction is not None:
+        if along is None:
+            raise DataError("friction opposes the motion: give actions= beside friction=")
+        size = check_friction(friction) * np.linalg.norm(blocking, axis=1)
+        blocking = F + size[:, None] * along
     touching, steadied = detect_contact(F, blocking, threshold, release, window, each)
-    unknown = np.isnan(touching)
+    unknown = np.isnan(touching) | detect_stuck(F, each)
     if along is not None:
-        # The mean over the window may lean a little the way this very sample moves, which it did.
-        steadied = remove_along(steadied, along)
+        if friction is None:
+            # The mean over the window may lean a little the way this very sample moves, which it did.
+            steadied = remove_along(steadied, along)
         size = np.empty(len(F))
         for own in each:
             size[own] = np.linalg.norm(running_median(F[own], window), axis=1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 KINDS = (
     "saved", "guess", "time", "burst", "rotation", "turn", "frame", "actions", "smoothing", "empty", "repeated",
-    "angle", "gap", "speed", "short", "jump", "pause", "missing", "slow", "relative", "order", "phase", "read",
+    "angle", "gap", "speed", "short", "jump", "pause", "missing", "slow", "stuck", "relative", "order", "phase", "read",
 )  # fmt: skip
 """In the order in which notes on one file are given; a new finding adds a line of its own here."""
 

@@ -37,6 +37,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.constraints.learnt.constant": ("ConstantConstraint",),
     "unconstrain.constraints.learnt.feature": ("FeatureConstraint",),
     "unconstrain.constraints.learnt.jacobian": ("JacobianFeatures",),
+    "unconstrain.constraints.learnt.mechanism": ("MechanismConstraint",),
     "unconstrain.recordings.columns": ("Columns",),
     "unconstrain.recordings.preparation": ("Preparation",),
     "unconstrain.spaces.angle": ("Angle",),

@@ -20,6 +20,7 @@ from reproduction.real.wiping_transfer import (
     WAYS,
     Error,
     compare,
+    find_verdict,
 )
 from unconstrain import plot
 from unconstrain.constraints import Payload
@@ -58,7 +59,7 @@ def run(folder: Path, repetitions: int, out: Path, progress: Callable[[str], Non
     return Outcome(
         "Wiping on two surfaces (rim, fender)",
         f"{tabulate_wipes(wipes)}\n\n{tabulate_errors(errors)}",
-        (*_say_forces(folder, payload, wipes), *_say_transfer(errors)),
+        (*_say_forces(folder, payload, wipes), *_say_transfer(errors), *_say_verdicts(folder, progress)),
         (picture,),
     )
 
@@ -197,6 +198,21 @@ def _say_transfer(errors: dict[tuple[str, str, str, str], Error]) -> list[str]:
         f"{stroke[3]:.2f} across, as a scrub is no single stroke."
     )
     return said
+
+
+def _say_verdicts(folder: Path, progress: Callable[[str], None]) -> list[str]:
+    """Say what `fit` says of positions on each surface, before the other is tried."""
+    said, warned = [], 0
+    for name in SURFACES:
+        progress(f"wiping: the verdict on {name}")
+        verdict = find_verdict(folder, name)
+        warned += not verdict.is_safe
+        said.append(f"Of a policy of position learnt on the {name} the verdict is: {verdict}.")
+    reached = "reached" if warned == len(SURFACES) else "missed"
+    return [
+        *said,
+        f"The verdict says so before the user finds out: {reached} (target: it does, where errors are above).",
+    ]
 
 
 def draw(folder: Path, wipes: list[Wipe]) -> Figure:

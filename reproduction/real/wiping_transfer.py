@@ -22,6 +22,8 @@ from reproduction.real.wiping_recordings import (
     read,
 )
 from unconstrain import constraints
+from unconstrain.evaluation import compare_risks, evaluate_held_out
+from unconstrain.evaluation.verdict import Verdict
 
 Array = NDArray[np.float64]
 
@@ -148,6 +150,15 @@ def compare(
                 if way != TOLD or samples[learnt].projections is not None:
                     errors[state, way, learnt, tried] = _try(samples[learnt], samples[tried], way)
     return errors
+
+
+def find_verdict(folder: Path, name: str) -> Verdict:
+    """Return what `unconstrain fit` says of a policy of position learnt on a surface."""
+    demos = uc.load(folder / FILES.format(name), state=POSITION, **WHERE).select(slice(None, None, STEP))
+    compared = compare_risks(uc.LocallyLinearPolicy(), demos, groups=demos.folds())
+    if compared.better is not None:
+        compared = compared.taking(compared.better)
+    return evaluate_held_out(compared, demos).verdict
 
 
 def _try(learnt: Samples, tried: Samples, way: str) -> Error:

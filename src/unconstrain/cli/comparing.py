@@ -58,6 +58,7 @@ def compare(
 def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
     """Say what was inferred, how all risks predict what was held out, and what that comes to."""
     from unconstrain.evaluation.evaluation import COLUMNS
+    from unconstrain.evaluation.verdict import LITTLE
     from unconstrain.policies.inferred import describe_inferred
 
     policy, better = comparison.policy, comparison.better
@@ -81,6 +82,11 @@ def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
         reporting.say(
             f"note: --risk {policy.risk} is better on what was held out, so it is taken; --risk adaptive keeps what "
             "was inferred all the same"
+        )
+    elif evaluation.regression.shown > evaluation.policy.shown + LITTLE:
+        reporting.say(
+            "note: ordinary regression explains more of what was held out, but folds differ so much that this is not "
+            f"sure, and --risk {policy.risk} is taken; --risk direct takes the other"
         )
     for sentence in evaluation.sentences():
         reporting.say(in_words_of_program(sentence))

@@ -85,8 +85,8 @@ def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
         )
     elif evaluation.regression.shown > evaluation.policy.shown + LITTLE:
         reporting.say(
-            "note: ordinary regression explains more of what was held out, but folds differ so much that this is not "
-            f"sure, and --risk {policy.risk} is taken; --risk direct takes the other"
+            f"note: ordinary regression explains more as recorded, but corrected for noise --risk {policy.risk} misses "
+            "less of what was held out, or no more for sure, so it is taken; --risk direct takes the other"
         )
     for sentence in evaluation.sentences():
         reporting.say(in_words_of_program(sentence))

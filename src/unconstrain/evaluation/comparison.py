@@ -14,16 +14,13 @@ from sklearn.base import clone
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics import identifiability
 from unconstrain.errors import PolicyError
-from unconstrain.evaluation.alternatives import choose_missing, find_turn, try_alternatives
-from unconstrain.evaluation.evaluation import REGRESSION, Evaluation, find_typical, score_still, share_known
-from unconstrain.evaluation.fixed import find_fixed
-from unconstrain.evaluation.following import follow
-from unconstrain.evaluation.scores import score
-from unconstrain.evaluation.verdict import WELL, Findings, conclude
+from unconstrain.evaluation.evaluation import REGRESSION, Evaluation, score_still
+from unconstrain.evaluation.findings import collect
+from unconstrain.evaluation.scores import find_typical, score
+from unconstrain.evaluation.verdict import conclude
 from unconstrain.fitting.inference import FREE
 from unconstrain.judging import Judge
 from unconstrain.policies.base import Policy
-from unconstrain.policies.inferred import is_in_doubt
 from unconstrain.selection import Row, Table, select_policy
 
 COMPARED = ("adaptive", "inconsistency", "direct")
@@ -228,31 +225,18 @@ def evaluate_held_out(
             compared.predictions, key=lambda risk: (risk != kept, list(compared.rows).index(risk))
         )
     ]
-    own = scores[0]
-    regression = next((each for each in scores if each.name.startswith(REGRESSION)), None)
-    tried = []
-    best = max(each.shown for each in scores)
-    P = policy.scaled(compared.predictions[kept])
-    typical = find_typical(U, P, judge, demos)
-    if best < WELL and not typical >= WELL:
-        tried = try_alternatives(policy, demos, without=without, progress=progress)
-    if progress is not None:
-        progress("following it from recorded starts")
-    found = Findings(
-        explained=own.shown,
-        regression=np.nan if regression is None else regression.shown,
-        held_out="held-out episodes" if demos.n_episodes > 1 else "held-out blocks",
-        typical=typical,
+    found = collect(
+        policy,
+        demos,
+        "held-out episodes" if demos.n_episodes > 1 else "held-out blocks",
+        judge=judge,
+        own=scores[0],
+        regression=next((each for each in scores if each.name.startswith(REGRESSION)), None),
+        typical=find_typical(U, policy.scaled(compared.predictions[kept]), judge, demos.episodes),
         free=None if policy.solution_.belief is None else policy.free_share_,
-        known=share_known(judge),
-        is_regression=kept == "direct",
-        in_doubt=is_in_doubt(policy),
-        fixed=find_fixed(demos),
-        tried=tuple(tried),
-        missing=choose_missing(best, tried),
         determined=identifiability(policy, demos).determined_share,
-        following=follow(policy, demos),
-        repeats=demos.time is not None and find_turn(demos) is not None,
+        without=without,
+        progress=progress,
     )
     return Evaluation((*scores, score_still(U, judge)), conclude(found))
 

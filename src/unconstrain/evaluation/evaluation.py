@@ -15,15 +15,12 @@ from unconstrain import metrics
 from unconstrain.constraints.nullspace import in_metric
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
-from unconstrain.evaluation.alternatives import choose_missing, find_turn, try_alternatives
 from unconstrain.evaluation.contact import Contact, find_contact
-from unconstrain.evaluation.fixed import find_fixed
-from unconstrain.evaluation.following import follow
-from unconstrain.evaluation.scores import Score, gaussian_log_likelihood, score
-from unconstrain.evaluation.verdict import WELL, Findings, Verdict, conclude
+from unconstrain.evaluation.findings import collect
+from unconstrain.evaluation.scores import Score, find_typical, gaussian_log_likelihood, score
+from unconstrain.evaluation.verdict import Verdict, conclude
 from unconstrain.judging import OF_WHAT_IS_SHOWN, Judge
 from unconstrain.policies.base import Policy
-from unconstrain.policies.inferred import is_in_doubt
 from unconstrain.selection import select_policy
 
 if TYPE_CHECKING:
@@ -228,29 +225,21 @@ def evaluate(
     several = demos.n_episodes > 1
     labels = demos.episode_labels[:most_episodes] if several else ()
     episodes = [score(label, U, P, judge, rows=demos.episodes == code) for code, label in enumerate(labels)]
-    typical = find_typical(U, P, judge, demos)
     nupe = None
     if demos.policy is not None:
         true = policy.scaled(demos.policy)
         nupe = metrics.normalized(metrics.unconstrained_policy_error(true, P), true)
-    tried = []
-    if max(total.shown, regression.shown) < WELL and not typical >= WELL:
-        tried = try_alternatives(policy, demos, without=without, progress=progress)
-    found = Findings(
-        explained=total.shown,
-        regression=regression.shown,
-        held_out="these recordings",
-        typical=typical,
+    found = collect(
+        policy,
+        demos,
+        "these recordings",
+        judge=judge,
+        own=total,
+        regression=regression,
+        typical=find_typical(U, P, judge, demos.episodes),
         free=float(free.mean()) if policy.solution_.belief is not None else None,
-        known=share_known(judge),
-        is_regression=policy.risk == "direct",
-        in_doubt=is_in_doubt(policy),
-        fixed=find_fixed(demos),
-        tried=tuple(tried),
-        missing=choose_missing(max(total.shown, regression.shown), tried),
-        following=follow(policy, demos),
-        is_stabilized=policy.stability_ is not None,
-        repeats=demos.time is not None and find_turn(demos) is not None,
+        without=without,
+        progress=progress,
     )
     return Evaluation(
         (total, regression, score_still(U, judge)),
@@ -261,38 +250,6 @@ def evaluate(
         nupe,
         tuple(remarks),
     )
-
-
-def find_typical(U: np.ndarray, P: np.ndarray, judge: Judge, demos: Demonstrations) -> float:
-    """Find what is explained of the middle one of the episodes, which one far from all others does not spoil.
-
-    Parameters
-    ----------
-    U, P : ndarray of shape (N, d)
-        Recorded and predicted actions.
-    judge : Judge
-        Says what is shown.
-    demos : Demonstrations
-        That they are of.
-
-    Returns
-    -------
-    float
-        A share; NaN where there is one episode alone.
-    """
-    if demos.n_episodes < 2:
-        return math.nan
-    with np.errstate(over="ignore", invalid="ignore"):
-        missed = np.bincount(demos.episodes, judge.unexplained(U, P))
-        motion = np.bincount(demos.episodes, np.einsum("nd,nd->n", U, U))
-        return float(np.median(1 - missed[motion > 0] / motion[motion > 0])) if motion.any() else math.nan
-
-
-def share_known(judge: Judge) -> float:
-    """Return the share of samples whose projection is known."""
-    if judge.projections is None:
-        return 0.0
-    return float(np.mean(~np.isnan(judge.projections).any(axis=(1, 2))))
 
 
 def score_still(U: np.ndarray, judge: Judge) -> Score:

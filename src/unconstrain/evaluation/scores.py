@@ -92,6 +92,31 @@ def score(
         )
 
 
+def find_typical(U: np.ndarray, P: np.ndarray, judge: Judge, episodes: np.ndarray) -> float:
+    """Find what is explained of the middle one of the episodes, which one far from all others does not spoil.
+
+    Parameters
+    ----------
+    U, P : ndarray of shape (N, d)
+        Recorded and predicted actions.
+    judge : Judge
+        Says what is shown.
+    episodes : ndarray of shape (N,), int
+        Codes from 0, of which each sample is.
+
+    Returns
+    -------
+    float
+        A share; NaN where there is one episode alone.
+    """
+    if not episodes.any():
+        return np.nan
+    with np.errstate(over="ignore", invalid="ignore"):
+        missed = np.bincount(episodes, judge.unexplained(U, P))
+        motion = np.bincount(episodes, np.einsum("nd,nd->n", U, U))
+        return float(np.median(1 - missed[motion > 0] / motion[motion > 0])) if motion.any() else np.nan
+
+
 def gaussian_log_likelihood(U: np.ndarray, P: np.ndarray) -> float:
     """Compute the log-likelihood of a sample if all were free, with the noise that makes it largest.
 

@@ -3,72 +3,16 @@
 import math
 from dataclasses import dataclass
 
-from unconstrain.evaluation.alternatives import Alternative
-from unconstrain.evaluation.following import Following
+from unconstrain.evaluation.findings import WELL, Findings
 
-WELL, BARELY = 0.9, 0.5
-"""Shares explained of what was held out: from the first on a robot may be moved by it, and what is less than the second
-leaves too much that looks like anything."""
+BARELY = 0.5
+"""Share explained of what was held out; with less, too much is left that looks like anything."""
 
 LITTLE = 0.01
 """A difference in what is explained that is not worth a word."""
 
 DETERMINED = 0.9
 """Share of the policy that recordings have to determine, or else the rest is named."""
-
-
-@dataclass(frozen=True)
-class Findings:
-    """What a verdict is based on.
-
-    Parameters
-    ----------
-    explained, regression : float
-        Share explained of what held-out recordings show, by the policy and by ordinary regression; NaN where nothing
-        moves or it is not known.
-    held_out : str
-        What they are, in words: "held-out episodes", "these recordings".
-    typical : float
-        The same of the policy, of the middle one of the episodes; NaN where there is one alone.
-    free : float or None
-        Share of samples inferred to be free; None where it was not inferred.
-    known : float
-        Share of samples whose constraint was known, and not inferred.
-    is_regression : bool
-        Whether the policy is ordinary regression, by its risk or since no constraint was found.
-    in_doubt : bool
-        Whether constraints are likely that the model is too coarse to tell.
-    fixed : tuple of str
-        Equations that all motion obeys.
-    tried : tuple of Alternative
-        What was tried in place of the position alone.
-    missing : Alternative or None
-        The one that explains the motion better by far.
-    determined : float or None
-        Share of the policy that the recordings determine; None where it was not looked at.
-    following : Following or None
-        Where it leads from recorded starts.
-    is_stabilized : bool
-        Whether the policy is one that ends at its goal.
-    repeats : bool
-        Whether the movement repeats itself, and has no goal.
-    """
-
-    explained: float
-    regression: float
-    held_out: str
-    typical: float = math.nan
-    free: float | None = None
-    known: float = 0.0
-    is_regression: bool = False
-    in_doubt: bool = False
-    fixed: tuple[str, ...] = ()
-    tried: tuple[Alternative, ...] = ()
-    missing: Alternative | None = None
-    determined: float | None = None
-    following: Following | None = None
-    is_stabilized: bool = False
-    repeats: bool = False
 
 
 @dataclass(frozen=True)

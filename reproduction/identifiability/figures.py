@@ -65,9 +65,10 @@ def plot_shares(results: list[dict[str, Any]]) -> Figure:
 
 def plot_advice(studies: dict[tuple[str, str], dict[str, np.ndarray]]) -> Figure:
     """Plot nUPE against the number of demonstrations, at random, as advised and by the oracle."""
-    figure = Figure(figsize=(4.8 * len(studies), 4.0), layout="constrained")
-    panels = figure.subplots(1, len(studies), squeeze=False)[0]
-    for ax, ((plant, risk), ways) in zip(panels, studies.items(), strict=True):
+    rows = -(-len(studies) // 2)
+    figure = Figure(figsize=(9.6, 4.0 * rows), layout="constrained")
+    panels = figure.subplots(rows, 2, squeeze=False).ravel()
+    for ax, ((plant, risk), ways) in zip(panels, studies.items(), strict=False):
         first, step = COUNTS[plant]
         for way, color in (("random", DIRECT), ("advised", LEARNT), ("oracle", TRUE)):
             if way not in ways:

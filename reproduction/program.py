@@ -56,6 +56,7 @@ RECORDINGS = click.option(
     metavar="FOLDER",
     help="Folder of the recorded surfaces; without it that part is left out.",
 )
+PART = click.option("--part", metavar="NAME", help="Only this part; a wrong name lists them.")
 
 
 @click.group(cls=Group, context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]})
@@ -142,7 +143,7 @@ _experiment(
 )
 _experiment("posture", *RUNNING, ADAPTIVE, *ROBOT)
 _experiment("constraints", *RUNNING, RECORDINGS)
-_experiment("identifiability", *RUNNING, RECORDINGS)
+_experiment("identifiability", *RUNNING, RECORDINGS, PART)
 _experiment(
     "adaptive",
     *RUNNING,
@@ -153,7 +154,7 @@ _experiment(
         help="Folder of recordings: handwriting/*.mat, reaching/reaching_cluttered.mat, and the recorded surfaces; "
         "without it those parts are left out.",
     ),
-    click.option("--part", metavar="NAME", help="Only this part; a wrong name lists them."),
+    PART,
 )
 
 

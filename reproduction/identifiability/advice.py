@@ -1,4 +1,8 @@
-"""Following the report's advice on what to record next, against recording at random."""
+"""Following the report's advice on what to record next, against recording at random and against knowing the truth."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +12,7 @@ from reproduction.scores import nupe
 from unconstrain.demo import make_policy
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics import identifiability
+from unconstrain.diagnostics.foresight import Movements
 from unconstrain.limit_cycle import LimitCycle, demonstrate
 from unconstrain.motion import directions
 from unconstrain.policies.base import Policy
@@ -16,7 +21,12 @@ from unconstrain.simulation import simulate
 
 Array = np.ndarray
 
-WAYS = ("advised", "random")
+WAYS = ("advised", "random", "oracle")
+"""How the next demonstration is chosen. The oracle has the truth in view: of several it takes the one after which the
+policy learnt has the least nUPE on the test movements."""
+
+KINDS = ("2-4-6", "1-3-5", "4-5-6", "1-2-3")
+"""Constraints on the arm's hand that can be chosen."""
 
 TOY_FIRST, TOY_MOST = 2, 24
 """Demonstrations of the limit cycle to begin with, and in the end."""
@@ -30,13 +40,49 @@ ARM_FIRST, ARM_MOST, ARM_AT_ONCE = 12, 60, 4
 ARM_POOL, PATH_POINTS = 30, 10
 """Random starts that the next are chosen from, and points at which a movement that is foreseen counts."""
 
-TOY = (TOY_FIRST, TOY_MOST, TOY_POOL)
-ARM = (ARM_FIRST, ARM_MOST, ARM_AT_ONCE, ARM_POOL, PATH_POINTS)
+MATTERING = 300
+"""Foreseen states of the arm over which the expected error is to fall."""
+
+TOY_TRIED, ARM_TRIED = 30, 10
+"""Demonstrations that the oracle tries for each that it takes."""
+
+TOY = (TOY_FIRST, TOY_MOST, TOY_POOL, TOY_TRIED)
+ARM = (ARM_FIRST, ARM_MOST, ARM_AT_ONCE, ARM_POOL, PATH_POINTS, MATTERING, ARM_TRIED)
 LENGTH, RATE = 40, 50.0
 """Samples of a movement around the limit cycle, and samples per second."""
 
+PLANTS = {"limit cycle": TOY, "arm": ARM}
+"""What is followed, and what its results depend on besides the seed."""
 
-def follow_on_toy(seed: int, way: str) -> list[float]:
+RISKS = ("inconsistency", "adaptive")
+
+Learn = Callable[[list[Demonstrations]], Policy]
+
+
+def follow(plant: str, risk: str, way: str, seed: int) -> dict[str, Any]:
+    """Follow one way to choose on one data set.
+
+    Parameters
+    ----------
+    plant : {"limit cycle", "arm"}
+        Of which demonstrations are made.
+    risk : str
+        That policies are learnt by.
+    way : str
+        One of `WAYS`.
+    seed : int
+        Of everything that is drawn.
+
+    Returns
+    -------
+    dict of str to list of float
+        "nUPE" after each number of demonstrations.
+    """
+    run = {"limit cycle": follow_on_toy, "arm": follow_on_arm}[plant]
+    return {"nUPE": run(seed, way, risk)}
+
+
+def follow_on_toy(seed: int, way: str, risk: str) -> list[float]:
     """Add demonstrations of the limit cycle one by one, each with one direction free all the way.
 
     Parameters
@@ -45,6 +91,8 @@ def follow_on_toy(seed: int, way: str) -> list[float]:
         Of everything that is drawn.
     way : str
         How the next is chosen, one of `WAYS`.
+    risk : str
+        That policies are learnt by.
 
     Returns
     -------
@@ -53,21 +101,38 @@ def follow_on_toy(seed: int, way: str) -> list[float]:
     """
     rng = np.random.default_rng([seed, 3])
     test = demonstrate(random_state=np.random.default_rng([seed, 1]))
+    learn = partial(_learn, lambda: make_policy(risk))
     movements = [record_along(*_draw_movement(rng)) for _ in range(TOY_FIRST)]
     errors = []
     while True:
-        seen = Demonstrations.concatenate(movements)
-        policy = make_policy().fit(seen.states, seen.actions, groups=seen.episodes)
+        policy = learn(movements)
         errors.append(nupe(test, policy.predict(test.states)))
         if len(movements) == TOY_MOST:
             return errors
         if way == "random":
             movements.append(record_along(*_draw_movement(rng)))
-            continue
-        report = identifiability(policy, seen.states, seen.actions, groups=seen.episodes)
-        pool = rng.uniform(-1.0, 1.0, size=(TOY_POOL, 2))
-        best = report.next_recordings(1, candidates=pool)[0]
-        movements.append(record_along(best.state, best.direction))
+        elif way == "oracle":
+            tried = [record_along(*_draw_movement(rng)) for _ in range(TOY_TRIED)]
+            movements.append(tried[_choose_in_truth(learn, movements, tried, test)])
+        else:
+            seen = Demonstrations.concatenate(movements)
+            report = identifiability(policy, seen.states, seen.actions, groups=seen.episodes)
+            pool = rng.uniform(-1.0, 1.0, size=(TOY_POOL, 2))
+            best = report.next_recordings(1, candidates=pool)[0]
+            movements.append(record_along(best.state, best.direction))
+
+
+def _learn(make: Callable[[], Policy], movements: list[Demonstrations]) -> Policy:
+    seen = Demonstrations.concatenate(movements)
+    return make().fit(seen.states, seen.actions, groups=seen.episodes)
+
+
+def _choose_in_truth(
+    learn: Learn, movements: list[Demonstrations], tried: list[Demonstrations], test: Demonstrations
+) -> int:
+    """Choose the demonstration after which the policy learnt has the least error on test movements."""
+    errors = [nupe(test, learn([*movements, one]).predict(test.states)) for one in tried]
+    return int(np.argmin(errors))
 
 
 def _draw_movement(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +145,7 @@ def record_along(start: Array, direction: Array) -> Demonstrations:
     return simulate(LimitCycle(), start, LENGTH - 1, 1 / RATE, project=lambda k, X, wanted: N)
 
 
-def follow_on_arm(seed: int, way: str, kinds: tuple[str, ...]) -> list[float]:
+def follow_on_arm(seed: int, way: str, risk: str, kinds: tuple[str, ...] = KINDS) -> list[float]:
     """Add demonstrations of the arm a few at a time, each from a start in a pool under one of the constraints.
 
     Parameters
@@ -89,6 +154,8 @@ def follow_on_arm(seed: int, way: str, kinds: tuple[str, ...]) -> list[float]:
         Of everything that is drawn.
     way : str
         How the next are chosen, one of `WAYS`.
+    risk : str
+        That policies are learnt by.
     kinds : tuple of str
         The constraints on the hand.
 
@@ -104,45 +171,56 @@ def follow_on_arm(seed: int, way: str, kinds: tuple[str, ...]) -> list[float]:
         arm.demonstrate(one, truth, 8, random_state=np.random.default_rng([seed, 5])) for one in constraints
     ]
     test = Demonstrations.concatenate(tests)
+    learn = partial(_learn, lambda: make_local_models(risk))
     movements = []
     for _ in range(ARM_FIRST):
         start = arm.draw_starts(1, rng)
         movements.append(arm.follow(constraints[rng.integers(len(constraints))], truth, start))
     errors = []
     while True:
-        seen = Demonstrations.concatenate(movements)
-        policy = make_local_models().fit(seen.states, seen.actions, groups=seen.episodes)
+        policy = learn(movements)
         errors.append(nupe(test, policy.predict(test.states)))
         if len(movements) >= ARM_MOST:
             return errors
         pool = arm.draw_starts(ARM_POOL, rng)
+        if way == "oracle":
+            for _ in range(ARM_AT_ONCE):
+                tried = [
+                    arm.follow(constraints[rng.integers(len(constraints))], truth, pool[i : i + 1])
+                    for i in rng.integers(ARM_POOL, size=ARM_TRIED)
+                ]
+                movements.append(tried[_choose_in_truth(learn, movements, tried, test)])
+            continue
         if way == "random":
             chosen = [
                 (pool[i : i + 1], constraints[rng.integers(len(constraints))]) for i in range(ARM_AT_ONCE)
             ]
         else:
-            chosen = _choose_most_telling(policy, seen, pool, constraints)
+            seen = Demonstrations.concatenate(movements)
+            chosen = _choose_most_telling(policy, seen, pool, constraints, rng)
         movements += [arm.follow(constraint, truth, start) for start, constraint in chosen]
 
 
 def _choose_most_telling(
-    policy: Policy, seen: Demonstrations, pool: Array, constraints: list[TaskConstraint]
+    policy: Policy,
+    seen: Demonstrations,
+    pool: Array,
+    constraints: list[TaskConstraint],
+    rng: np.random.Generator,
 ) -> list[tuple[Array, TaskConstraint]]:
     """Choose starts and constraints whose movements, as the learnt policy foresees them, would tell most."""
     report = identifiability(policy, seen.states, seen.actions, groups=seen.episodes)
     paths = [foresee(policy, pool, constraint) for constraint in constraints]
-    X = np.concatenate([path[0] for path in paths])  # (4 C, points, 7)
-    q = np.concatenate([path[1] for path in paths])
-    length = seen.states.shape[0] / seen.n_episodes
-    candidates = X[:, ::3].reshape(-1, 7)
-    planner = report.planner(candidates[:: max(1, len(candidates) // 200)], length / PATH_POINTS)
+    foreseen = Movements(*(np.concatenate(each) for each in zip(*paths, strict=True)))
+    states = foreseen.states.reshape(-1, foreseen.states.shape[-1])
+    planner = report.planner(rng.permutation(states)[:MATTERING], len(seen.states) / seen.n_episodes)
+    starts = np.arange(len(foreseen)) % len(pool)
     chosen: list[int] = []
     for _ in range(ARM_AT_ONCE):
-        gains = planner.gains(X.reshape(-1, 7), q.reshape(-1, 7)).reshape(len(X), -1).sum(axis=1)
-        gains[chosen] = -np.inf
+        gains = planner.gains_of(foreseen)
+        gains[np.isin(starts, starts[chosen])] = -np.inf
         chosen.append(int(np.argmax(gains)))
-        for x, along in zip(X[chosen[-1]], q[chosen[-1]], strict=True):
-            planner.record(x[None], along[None])
+        planner.record_movements(foreseen.select(slice(chosen[-1], chosen[-1] + 1)))
     return [(pool[i % len(pool)][None], constraints[i // len(pool)]) for i in chosen]
 
 

@@ -15,8 +15,8 @@ from unconstrain.limit_cycle import LimitCycle, demonstrate
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, TRUE
 
 COUNTS = {
-    "advice, toy": (advice.TOY_FIRST, 1),
-    "advice, arm": (advice.ARM_FIRST, advice.ARM_AT_ONCE),
+    "limit cycle": (advice.TOY_FIRST, 1),
+    "arm": (advice.ARM_FIRST, advice.ARM_AT_ONCE),
 }
 """Demonstrations to begin with, and how many are added at a time."""
 
@@ -63,18 +63,22 @@ def plot_shares(results: list[dict[str, Any]]) -> Figure:
     return figure
 
 
-def plot_advice(results: list[dict[str, Any]]) -> Figure:
-    """Plot nUPE against the number of demonstrations, advised and random."""
-    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
-    for ax, (part, (first, step)) in zip(figure.subplots(1, 2), COUNTS.items(), strict=True):
-        for way, color in (("random", DIRECT), ("advised", LEARNT)):
-            errors = np.array([result[part][way] for result in results])
-            counts = first + step * np.arange(errors.shape[1])
-            low, middle, high = np.percentile(errors, [25, 50, 75], axis=0)
+def plot_advice(studies: dict[tuple[str, str], dict[str, np.ndarray]]) -> Figure:
+    """Plot nUPE against the number of demonstrations, at random, as advised and by the oracle."""
+    rows = -(-len(studies) // 2)
+    figure = Figure(figsize=(9.6, 4.0 * rows), layout="constrained")
+    panels = figure.subplots(rows, 2, squeeze=False).ravel()
+    for ax, ((plant, risk), ways) in zip(panels, studies.items(), strict=False):
+        first, step = COUNTS[plant]
+        for way, color in (("random", DIRECT), ("advised", LEARNT), ("oracle", TRUE)):
+            if way not in ways:
+                continue
+            counts = first + step * np.arange(ways[way].shape[1])
+            low, middle, high = np.percentile(ways[way], [25, 50, 75], axis=0)
             ax.fill_between(counts, low, high, color=color, alpha=0.15, lw=0)
             ax.plot(counts, middle, "o-", color=color, ms=3.5, label=way)
         ax.set_yscale("log")
-        ax.set(xlabel="demonstrations", ylabel="nUPE", title=part.split(", ")[1])
+        ax.set(xlabel="demonstrations", ylabel="nUPE", title=f"{plant}, {risk}")
         ax.grid(alpha=0.3)
         ax.legend(frameon=False)
     return figure

@@ -14,6 +14,12 @@ from reproduction.recordings import NEEDED
 
 Results = list[dict[str, Any]]
 
+Studies = dict[tuple[str, str], dict[str, NDArray[np.float64]]]
+"""By plant and risk, and by way to choose: nUPE (S, K) of S data sets after K numbers of demonstrations."""
+
+RESAMPLED = 2000
+"""Bootstrap samples of data sets behind an interval."""
+
 DEVIATIONS = ("std against error", "in the 90 % interval")
 """Columns that compare standard deviations with errors."""
 
@@ -82,26 +88,92 @@ def correlate_ranks(results: Results, p: float) -> NDArray[np.float64]:
     )
 
 
-def count_demonstrations(results: Results, part: str) -> tuple[int, int, float]:
-    """Count how many random and how many advised demonstrations reach the least median error of random ones.
+def count_demonstrations(random: NDArray[np.float64], other: NDArray[np.float64]) -> tuple[int, int]:
+    """Count how many demonstrations reach the least median error of random ones.
+
+    Parameters
+    ----------
+    random, other : ndarray of shape (S, K)
+        nUPE of S data sets, chosen at random and otherwise, after each of K numbers of demonstrations.
 
     Returns
     -------
-    at_random, as_advised : int
-        Numbers of demonstrations.
-    error : float
-        The error that is reached.
+    at_random, otherwise : int
+        Places among these numbers; K where it is not reached.
     """
-    random, advised = (np.median([r[part][way] for r in results], axis=0) for way in ("random", "advised"))
-    first, step = COUNTS[part]
-    best = np.minimum.accumulate(random)
-    at_random, as_advised = int(np.argmax(best <= best[-1])), advised <= best[-1]
-    reached = int(np.argmax(as_advised)) if as_advised.any() else len(advised)
-    return first + step * at_random, first + step * reached, float(best[-1])
+    middle, best = np.median(other, axis=0), np.minimum.accumulate(np.median(random, axis=0))
+    reached = middle <= best[-1]
+    return int(np.argmax(best <= best[-1])), int(np.argmax(reached)) if reached.any() else len(middle)
+
+
+def measure_share(random: NDArray[np.float64], other: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Measure which share of the demonstrations added at random is needed for the same error, with an interval.
+
+    Parameters
+    ----------
+    random, other : ndarray of shape (S, K)
+        As for `count_demonstrations`.
+
+    Returns
+    -------
+    share, low, high : float
+        The share, and the 5 and 95 percentiles of it over bootstrap samples of data sets.
+    """
+
+    def share(rows: NDArray[np.int64]) -> float:
+        at_random, otherwise = count_demonstrations(random[rows], other[rows])
+        return otherwise / max(at_random, 1)
+
+    sets, rng = len(other), np.random.default_rng(0)
+    drawn = [share(rng.integers(sets, size=sets)) for _ in range(RESAMPLED)]
+    low, high = np.percentile(drawn, [5, 95])
+    return share(np.arange(sets)), float(low), float(high)
+
+
+def write_advice_table(studies: Studies) -> str:
+    """Write how many demonstrations each way to choose needs for what random choice reaches in the end."""
+    rows = []
+    for (plant, risk), ways in studies.items():
+        first, step = COUNTS[plant]
+        for way, errors in ways.items():
+            random = ways["random"][: len(errors)]
+            at_random, needed = count_demonstrations(random, errors)
+            share, low, high = measure_share(random, errors)
+            last = np.median(errors[:, -1]) / np.median(random[:, -1])
+            reached = needed < errors.shape[1]
+            rows.append(
+                [
+                    f"{plant}, {risk}",
+                    way,
+                    str(len(errors)),
+                    f"{first + step * (needed if reached else at_random)}{'' if reached else ' are too few'}",
+                    "1" if way == "random" else f"{share:.2f} ({low:.2f} to {high:.2f})" if reached else "-",
+                    f"{np.median(errors[:, -1]):.2g} ({last:.2g})",
+                ]
+            )
+    return markdown.table(
+        ["advice", "chosen", "data sets", "demonstrations", "share of random", "nUPE in the end (of random)"],
+        rows,
+    )
+
+
+def list_advice(studies: Studies) -> tuple[str, ...]:
+    """Say what following the advice saves, and how much an oracle would."""
+    sentences = []
+    for (plant, risk), ways in studies.items():
+        for way, errors in ways.items():
+            if way != "random":
+                share, low, high = measure_share(ways["random"][: len(errors)], errors)
+                sentences.append(
+                    f"{plant[0].upper()}{plant[1:]}, {risk}, {way}: {share:.2f} of the demonstrations that random "
+                    f"choice adds ({low:.2f} to {high:.2f}, {len(errors)} data sets): half is "
+                    f"{'reached' if share <= 0.5 else 'not reached'}."
+                )
+    return tuple(sentences)
 
 
 def list_findings(results: Results, found: list[Surface]) -> tuple[str, ...]:
-    """Say whether shares order the errors, what following the advice saves, and what the surfaces show."""
+    """Say whether shares order the errors, and what the surfaces show."""
     sentences = []
     for p in POWERS:
         each = correlate_ranks(results, p)
@@ -113,19 +185,6 @@ def list_findings(results: Results, found: list[Surface]) -> tuple[str, ...]:
             f"Arm, p = {p}: rank correlation of determined share and nUPE {each.mean():.2f} ± {each.std():.2f} over "
             f"trials, {np.mean(each <= -0.999):.0%} of them in perfect order; of the means over trials "
             f"{spearmanr(shares, errors).statistic:.2f}."
-        )
-    for part in COUNTS:
-        random, advised, error = count_demonstrations(results, part)
-        begun = COUNTS[part][0]
-        last = {
-            way: np.median([result[part][way][-1] for result in results]) for way in ("random", "advised")
-        }
-        share = (advised - begun) / (random - begun)
-        sentences.append(
-            f"{part[0].upper()}{part[1:]}: a median nUPE of {error:.2g} takes {random} demonstrations at random and "
-            f"{advised} as advised ({advised / random:.2f} of all; {share:.2f} of those added to the first {begun}): "
-            f"half is {'reached' if share <= 0.5 else 'not reached'}. With equally many, in the end, the error as "
-            f"advised is {last['advised'] / last['random']:.2f} of that at random."
         )
     for surface in found:
         sentences.append(

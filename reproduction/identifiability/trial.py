@@ -1,4 +1,4 @@
-"""One trial: does the report tell the truth? Shares and deviations beside errors, and advice followed."""
+"""One trial: does the report tell the truth? Shares and deviations beside errors."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,7 +7,6 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from reproduction.arm.trial import Recordings, make_local_models
-from reproduction.identifiability import advice
 from reproduction.scores import nupe
 from unconstrain.demo import make_policy
 from unconstrain.demonstrations import Demonstrations
@@ -25,7 +24,7 @@ BEST_FIRST = ("2-4-6", "1-3-5", "4-5-6", "1-2-3")
 NINETY = 1.6448536269514722
 """Standard deviations on either side that hold 90 % of a Gaussian."""
 
-SETTINGS = {"powers": POWERS, "toy": advice.TOY, "arm": advice.ARM, "version": 2}
+SETTINGS = {"powers": POWERS, "version": 3}
 """What the results depend on besides the seed."""
 
 
@@ -34,8 +33,6 @@ def run_trial(seed: int) -> dict[str, Any]:
     return {
         "arm": {f"{p} {rows}": _run_arm(p, rows, seed) for p in POWERS for rows in BEST_FIRST},
         "calibration": _calibrate(seed),
-        "advice, toy": {way: advice.follow_on_toy(seed, way) for way in advice.WAYS},
-        "advice, arm": {way: advice.follow_on_arm(seed, way, BEST_FIRST) for way in advice.WAYS},
     }
 
 

@@ -85,6 +85,7 @@ def test_help_lists_the_experiments_and_their_own_options(program):
         (["posture", "--video", "a.mp4"], "No such option '--video'"),
         (["constraints", "--recordings", "."], "as --recordings"),
         (["identifiability", "--recordings", "nowhere"], "there is no recording nowhere/planer_circle.csv"),
+        (["identifiability", "--part", "toy"], "there is no part 'toy': choose one of report, advice"),
         (["adaptive", "--data", "nowhere"], "there is no folder nowhere: give the folder"),
         (["adaptive", "--part", "toy"], "there is no part 'toy': choose one of cycle, cycle400"),
         (["adaptive", "--part", "handwriting"], "'handwriting' cannot be run: give the folder"),

@@ -13,6 +13,7 @@ from unconstrain.diagnostics.advice import CRITERIA, PlannedRecording, Planner
 from unconstrain.diagnostics.bound import bound_directions, compute_bounds
 from unconstrain.diagnostics.coverage import Coverage, compute_coverage
 from unconstrain.diagnostics.episodes import Contribution, compute_contributions
+from unconstrain.diagnostics.foresight import Foresight
 from unconstrain.diagnostics.information import Information
 from unconstrain.diagnostics.regions import POOL, Region, find_worst_regions, orient
 from unconstrain.diagnostics.spectrum import compute_shares
@@ -20,6 +21,8 @@ from unconstrain.diagnostics.words import describe
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import farthest_first
 from unconstrain.features.scaling import Scaling
+from unconstrain.fitting.in_space import in_units
+from unconstrain.fitting.observation import observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import directions as unit_directions
 from unconstrain.policies.base import Policy
@@ -131,6 +134,16 @@ class Identifiability:
             return Posterior.of(moments, decay=decay)
         return calibration.posterior(moments, decay)
 
+    @cached_property
+    def _cautious(self) -> Posterior | None:
+        """The posterior if no sample shows more than what lies along its motion, where more was inferred."""
+        if self.samples is None or self.policy.solution_.belief is None:
+            return None
+        model, samples = self.policy.model_, in_units(self.policy.model_.scale, self.samples)
+        along = observe("inconsistency", samples.actions, samples.projections)
+        moments = model.moments(samples.states, along, samples.weights)
+        return Posterior.of(moments, decay=model.decay(moments))
+
     def covariance(self, X: ArrayLike) -> np.ndarray:
         """Compute how far the policy may be from `predict(X)`.
 
@@ -218,6 +231,8 @@ class Identifiability:
     ) -> list[PlannedRecording]:
         """Choose the recordings to make next.
 
+        Each is followed along its way, as the policy learnt so far foresees it; see `diagnostics.advice`.
+
         Parameters
         ----------
         k : int
@@ -262,7 +277,7 @@ class Identifiability:
         X : array_like of shape (R, n)
             Where each recording starts.
         directions : array_like of shape (R, d)
-            The direction along which each moves, of any length.
+            The direction along which motion is free in each, of any length.
         candidates : array_like of shape (C, n), optional
             As for `next_recordings`.
         length : float, optional
@@ -314,8 +329,12 @@ class Identifiability:
         if length is None:
             episodes = self.episodes
             length = 1.0 if episodes is None else len(episodes) / len(np.unique(episodes))
-        repeats = check_number(length, "length", positive=True)
-        return Planner(self.policy, self.posterior, check_states(self.policy, candidates), repeats)
+        length = check_number(length, "length", positive=True)
+        foresight = (
+            Foresight(self.policy) if self.samples is None else Foresight.of(self.policy, self.samples)
+        )
+        posteriors = [self.posterior] if self._cautious is None else [self.posterior, self._cautious]
+        return Planner(self.policy, posteriors, check_states(self.policy, candidates), length, foresight)
 
     def contributions(self) -> list[Contribution]:
         """Compute how many of the determined directions each episode holds, and which could be dropped.

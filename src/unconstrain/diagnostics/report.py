@@ -435,7 +435,11 @@ class Identifiability:
         return compute_bounds(self._risks, self.spectra, weight, self.threshold)
 
     def _relate(self, error: float) -> str:
-        """Say an error as a share of the mean squared action."""
+        """Say an error as a share of the mean squared action, or that it is so large that it says nothing."""
         moments = self.information.moments
         motion = float(np.sum(moments.squares) / np.sum(moments.weight))
-        return f"{error / motion:.3g} of the mean squared action" if np.isfinite(error) and motion else "none"
+        if not (np.isfinite(error) and motion):
+            return "none"
+        if error >= motion:
+            return "says nothing, as it is more than the mean squared action itself"
+        return f"{error / motion:.3g} of the mean squared action"

@@ -84,8 +84,8 @@ class Row:
         Why the candidate could not be fitted.
     log_likelihood : float
         Of a held-out sample, where the candidate infers which samples were free.
-    by_fold : tuple of float
-        Mean error in each fold.
+    by_fold, explained_by_fold : tuple of float
+        Mean error, and share explained, in each fold.
     """
 
     name: str
@@ -98,6 +98,7 @@ class Row:
     problem: str | None = None
     log_likelihood: float = np.nan
     by_fold: tuple[float, ...] = ()
+    explained_by_fold: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -442,14 +443,17 @@ def _judge(row: Row, found: _HeldOut, judge: Judge, metric: Policy, U: np.ndarra
     """Complete a candidate's row."""
     U, predictions = metric.scaled(U), metric.scaled(found.predictions)
     errors = judge.errors(U, predictions)
-    missed = judge.unexplained(U, predictions)
-    means = np.array([errors[found.fold == k].mean() for k in np.unique(found.fold)])
+    missed, motion = judge.unexplained(U, predictions), np.einsum("nd,nd->n", U, U)
+    folds = [found.fold == k for k in np.unique(found.fold)]
+    means = np.array([errors[own].mean() for own in folds])
+    shares = [1.0 - float(missed[own].sum() / motion[own].sum()) for own in folds if motion[own].any()]
     return replace(
         row,
         error=float(errors.mean()),
         standard_error=float(means.std(ddof=1) / np.sqrt(len(means))),
-        explained=1.0 - float(missed.sum() / np.einsum("nd,nd->", U, U)),
+        explained=1.0 - float(missed.sum() / motion.sum()),
         by_fold=tuple(means.tolist()),
+        explained_by_fold=tuple(shares),
     )
 
 

@@ -72,21 +72,22 @@ def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
     if inferred:
         reporting.say(inferred)
     reporting.say_table(("held out", *COLUMNS[1:]), evaluation.rows())
-    if better is not None:
-        rival = "ordinary regression" if better == "direct" else f"the risk {better}"
-        reporting.say(
-            f"warning: {rival} is better on what was held out than --risk {policy.risk}, which was asked for; without "
-            "--risk the better one is taken"
-        )
-    elif not is_given("risk") and policy.risk != "adaptive":
+    if is_given("risk"):
+        if better is not None:
+            rival = "ordinary regression" if better == "direct" else f"the risk {better}"
+            reporting.say(
+                f"warning: {rival} is better on what was held out than --risk {policy.risk}, which was asked for; "
+                "without --risk the better one is taken"
+            )
+    elif policy.risk != "adaptive":
         reporting.say(
             f"note: --risk {policy.risk} is better on what was held out, so it is taken; --risk adaptive keeps what "
             "was inferred all the same"
         )
     elif evaluation.regression.shown > evaluation.policy.shown + LITTLE:
         reporting.say(
-            f"note: ordinary regression explains more as recorded, but corrected for noise --risk {policy.risk} misses "
-            "less of what was held out, or no more for sure, so it is taken; --risk direct takes the other"
+            "note: ordinary regression explains more in all, but not in the middle fold, so --risk adaptive is taken; "
+            "--risk direct takes the other"
         )
     for sentence in evaluation.sentences():
         reporting.say(in_words_of_program(sentence))

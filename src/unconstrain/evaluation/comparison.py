@@ -75,14 +75,16 @@ class Comparison:
     def better(self) -> str | None:
         """The risk of least held-out error among those that are better than the policy's own, if there are.
 
-        Another has to be surely better, but for ordinary regression, the simplest: it is better if its error is lower
-        in the mean and in the middle fold, by a measure that forgives what was inferred to be constrained.
+        Another has to be surely better; but ordinary regression, the simplest, only has to explain more of what is
+        shown, in all and in the middle fold: that measure forgives what was inferred to be constrained, and a policy
+        that loses by it all the same has inferred what is not there.
         """
         beaten_by = [
             risk
             for risk, row in self.rows.items()
             if row is not self.kept
-            and (_is_surely_better(row, self.kept) or (risk == "direct" and _is_lower(row, self.kept)))
+            and row.problem is None
+            and (_is_surely_better(row, self.kept) or (risk == "direct" and _explains_more(row, self.kept)))
         ]
         return min(beaten_by, key=lambda risk: self.rows[risk].error, default=None)
 
@@ -91,15 +93,16 @@ class Comparison:
         return replace(self, policy=self.policies[risk])
 
 
-def _is_lower(one: Row, other: Row) -> bool:
-    if one.problem is not None:
-        return False
-    pairs = ((one.error, other.error), (np.median(one.by_fold), np.median(other.by_fold)))
-    return all(own < rival - NOTICEABLE * abs(rival) for own, rival in pairs)
+def _explains_more(one: Row, other: Row) -> bool:
+    shares = (
+        (one.explained, other.explained),
+        (np.median(one.explained_by_fold), np.median(other.explained_by_fold)),
+    )
+    return all(own > rival + NOTICEABLE for own, rival in shares)
 
 
 def _is_surely_better(one: Row, other: Row) -> bool:
-    if one.problem is not None or not one.error < other.error - NOTICEABLE * abs(other.error):
+    if not one.error < other.error - NOTICEABLE * abs(other.error):
         return False
     if np.median(one.by_fold) < MUCH * np.median(other.by_fold):  # a single fold may go wrong without bounds
         return True

@@ -385,7 +385,7 @@ def test_the_experiment_goes_on_and_says_what_is_left_out(tmp_path, monkeypatch,
     monkeypatch.setattr(experiment, "PARTS", parts)
     monkeypatch.setattr(experiment, "list_ways", lambda: ways.WAYS)
     monkeypatch.setattr(recorded, "describe_found", lambda *_: {})
-    outcome = experiment.reproduce(tmp_path / "out", trials=2, console=QUIET, data=data_folder)
+    outcome = experiment.reproduce(tmp_path / "out", trials=1, console=QUIET, data=data_folder)
     assert "### Limit cycle, 40 movements" in outcome.table
     assert "| Line |" in outcome.table
     left_out = [sentence for sentence in outcome.findings if "left out" in sentence]
@@ -394,7 +394,7 @@ def test_the_experiment_goes_on_and_says_what_is_left_out(tmp_path, monkeypatch,
     assert all(path.stat().st_size > 1000 for path in outcome.figures)
     assert set(json.loads((tmp_path / "out" / "trials.json").read_text())) == {"cycle", "handwriting"}
     monkeypatch.setattr(simulated, "compare_ways", None)
-    again = experiment.reproduce(tmp_path / "out", trials=2, console=QUIET)
+    again = experiment.reproduce(tmp_path / "out", trials=1, console=QUIET)
     assert again.table in outcome.table
     assert sum(experiment.NEEDED in sentence for sentence in again.findings) == 2
 

@@ -211,8 +211,7 @@ def test_mistakes_are_told_in_one_sentence(client, monkeypatch):
         pass
 
 
-@pytest.mark.parametrize("derived", [False, True])
-@pytest.mark.parametrize("make", [adaptive.parametric, adaptive.local])
+@pytest.mark.parametrize(("make", "derived"), [(adaptive.parametric, False), (adaptive.local, True)])
 def test_contact_is_inferred_in_as_many_passes_as_it_takes(tmp_path, client, make, derived):
     time = adaptive.TIME.copy()
     for label in np.unique(adaptive.EPISODES)[::3]:  # gaps, which make more episodes, dealt out on the spot

@@ -69,9 +69,10 @@ def batches(cuts, known=False):
         yield X[a:b], U[a:b], EPISODES[a:b], *((N[a:b],) if known else ())
 
 
-@pytest.mark.parametrize("known", [False, True])
-@pytest.mark.parametrize("alpha", ["cv", 1e-4])
-@pytest.mark.parametrize("make", [parametric, local])
+@pytest.mark.parametrize(
+    ("make", "alpha", "known"),
+    [(parametric, "cv", True), (parametric, 1e-4, False), (local, "cv", False), (local, 1e-4, True)],
+)
 def test_a_stream_gives_the_fit_of_all_at_once(tmp_path, make, alpha, known):
     whole = make(alpha).fit(X, U, groups=EPISODES, projections=N if known else None)
     assert 0.1 < whole.free_share_ < 0.95

@@ -282,7 +282,7 @@ def test_diagnose_warns_says_and_stops(run, tmp_path):
     demos.save(recording)
     model = ["--model", "rbf", "--width", "0.3", "--centers", "grid", "--alpha", "1e-6"]
     _, out, _ = run("fit", recording, *model, "--out", saved)
-    assert "of the policy is not determined by these recordings, and `unconstrain diagnose`" in out
+    assert "of the policy is not determined by what it was learnt from (`unconstrain diagnose`" in out
     picture = tmp_path / "known.png"
     code, told, err = run("diagnose", recording, *model, "--figure", picture)
     assert code == 0, err

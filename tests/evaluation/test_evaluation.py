@@ -46,7 +46,7 @@ def test_a_policy_stands_beside_ordinary_regression_and_standing_still(bent):
     assert found.regression.rmse == pytest.approx(
         uc.metrics.root_mean_square(others.actions, direct.predict(others.states)), rel=1e-6
     )
-    assert "a varying constraint bent" in found.verdict.sentence
+    assert "a varying constraint seems to have bent" in found.verdict.sentence
     assert "ordinary regression explains" in found.verdict.sentence
     assert str(found).endswith(f"verdict: {found.verdict}")
     assert found.to_pandas().loc["policy", "rmse"] == found.policy.rmse
@@ -89,7 +89,11 @@ def test_where_nothing_is_in_the_way_the_verdict_says_so():
     found = uc.evaluate(policy, demos.select(demos.episodes >= 4))
     assert found.policy.free == pytest.approx(1.0, abs=0.02)
     assert "no varying constraint was found" in found.verdict.sentence
-    assert found.verdict.is_safe
+    assert "it was not followed, as the recordings have no time" in found.verdict.sentence
+    assert not found.verdict.is_safe
+    timed = uc.Demonstrations(demos.states, demos.actions, demos.episodes, np.tile(0.02 * np.arange(50), 8))
+    assert uc.evaluate(policy, timed).verdict.is_safe
+    assert "6 samples are too few" in uc.evaluate(policy, timed.select(slice(6))).verdict.sentence
 
 
 def test_motion_that_never_leaves_a_plane_says_nothing_of_the_policy_across_it():
@@ -124,9 +128,9 @@ def circles(rng):
 @pytest.mark.parametrize(
     ("draw", "options"),
     [
-        (reaches, {"relative_to=goal", "relative_to=goal and model=linear"}),
-        (eights, {"order=2", "phase=True"}),
-        (circles, {"moving_centre=0.5 and model=linear", "moving_centre=0.5"}),
+        (reaches, {"--relative-to goal", "--relative-to goal --model linear"}),
+        (eights, {"--order 2", "--phase"}),
+        (circles, {"--moving-centre 0.5 --model linear", "--moving-centre 0.5"}),
     ],
 )
 def test_what_is_missing_is_named_with_its_option(draw, options):

@@ -10,17 +10,12 @@ from unconstrain.progress import working
 if TYPE_CHECKING:
     from unconstrain.demonstrations import Demonstrations
     from unconstrain.evaluation import Comparison, Evaluation
+    from unconstrain.policies.base import Policy
     from unconstrain.selection import Row
 
 
-def compare(
-    demos: "Demonstrations",
-    model: models.Model,
-    folds: str | None,
-    used: frozenset[str],
-    label: str = "taken",
-) -> tuple["Comparison", "Evaluation"]:
-    """Fit all risks, keep the better unless the command line asks for one, and evaluate it.
+def compare(demos: "Demonstrations", model: models.Model, folds: str | None) -> "Comparison":
+    """Fit all risks, and keep the better unless the command line asks for one.
 
     Parameters
     ----------
@@ -28,18 +23,14 @@ def compare(
     model : Model
     folds : "episodes", "blocks", or None
         What is held out.
-    used : frozenset of str
-        Options that made the states what they are; see `Recorded.options_used`.
-    label : str
-        What becomes of the policy, for its line of the table.
 
     Returns
     -------
-    Comparison, Evaluation
-        The policy that is kept is the comparison's own.
+    Comparison
+        Its own policy is the one that is kept.
     """
     from unconstrain.constraints.recorded import describe_known
-    from unconstrain.evaluation import compare_risks, evaluate_held_out
+    from unconstrain.evaluation import compare_risks
 
     if demos.projections is not None:
         reporting.say(f"constraints: {describe_known(demos.projections)}")
@@ -50,9 +41,40 @@ def compare(
 
         policy = None if model.is_chosen else model.build()
         compared = compare_risks(policy, demos, groups=demos.folds(folds), progress=progress)
-        if compared.better is not None and not is_given("risk"):
-            compared = compared.taking(compared.better)
-        return compared, evaluate_held_out(compared, demos, label=label, without=used, progress=report)
+    if compared.better is not None and not is_given("risk"):
+        return compared.taking(compared.better)
+    return compared
+
+
+def evaluate(
+    compared: "Comparison",
+    demos: "Demonstrations",
+    used: frozenset[str],
+    *,
+    stable: "Policy | None" = None,
+    label: str = "taken",
+) -> "Evaluation":
+    """Say what held-out episodes tell of the policy that is kept.
+
+    Parameters
+    ----------
+    compared : Comparison
+    demos : Demonstrations
+    used : frozenset of str
+        Options that made the states what they are; see `Recorded.options_used`.
+    stable : Policy, optional
+        The policy made to end at its goal.
+    label : str
+        What becomes of it, for its line of the table.
+
+    Returns
+    -------
+    Evaluation
+    """
+    from unconstrain.evaluation import evaluate_held_out
+
+    with working("evaluating") as report:
+        return evaluate_held_out(compared, demos, stable=stable, label=label, without=used, progress=report)
 
 
 def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:

@@ -59,7 +59,8 @@ def diagnose(
     with working("reading"):
         demos = constraining.tell(recorded.load(), constraint)
     recordings.describe(demos)
-    comparison, evaluation = comparing.compare(demos, model, folds, recorded.options_used)
+    comparison = comparing.compare(demos, model, folds)
+    evaluation = comparing.evaluate(comparison, demos, recorded.options_used)
     with working("diagnosing"):
         found = identifiability(comparison.policy, demos, threshold=threshold)
         text = found.describe(demos.state_names, demos.action_names, most)

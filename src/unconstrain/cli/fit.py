@@ -121,13 +121,16 @@ def fit(
         return
     demos = constraining.tell(demos, constraint)
     recordings.describe(demos)
-    comparison, evaluation = comparing.compare(demos, model, folds, recorded.options_used, "saved")
+    comparison = comparing.compare(demos, model, folds)
     policy = comparison.policy
     policy.recording_ = recorded.kept(opened)
     policy.state_names_ = list(demos.state_names)
     if stable_at is not None:
         with working("making it end at the goal"):
             policy = stabilizing.stabilize(policy, stable_at, recorded.columns, demos)
+    stable = None if stable_at is None else policy
+    evaluation = comparing.evaluate(comparison, demos, recorded.options_used, stable=stable, label="saved")
+    policy.determined_share_ = comparison.policy.determined_share_
     policy.save(out, resumable=resumable)
     if figure is not None:
         from unconstrain import plot

@@ -1,5 +1,6 @@
 """Limits of states on the command line: in numbers, or those of a robot's joints."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,10 +28,15 @@ class LimitsType(click.ParamType):
         if not isinstance(value, str):
             return value
         if ":" not in value or Path(value).is_file():
+            if not Path(value).is_file():
+                self.fail(f"{value!r} is neither limits nor the file of a robot: {EXAMPLE}", param, ctx)
             return Path(value)
         parts = value.split(",")
         named = [part.rpartition("=") for part in parts]
         if any(name for name, _, _ in named):
+            names = [name.strip() for name, _, _ in named]
+            if len(set(names)) < len(names):
+                self.fail(f"{value!r} names a state twice: {EXAMPLE}", param, ctx)
             return {name.strip(): self._parse_pair(pair, param, ctx) for name, _, pair in named}
         return [self._parse_pair(pair, param, ctx) for pair in parts]
 
@@ -38,6 +44,8 @@ class LimitsType(click.ParamType):
         try:
             low, high = (float(number) if number.strip() else None for number in text.split(":"))
         except ValueError:
+            self.fail(f"{text!r} is no pair of limits: {EXAMPLE}", param, ctx)
+        if any(limit is not None and math.isnan(limit) for limit in (low, high)):
             self.fail(f"{text!r} is no pair of limits: {EXAMPLE}", param, ctx)
         return low, high
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_finite, check_number, check_numbers
+from unconstrain.arrays import check_finite, check_number, check_numbers, quote
 from unconstrain.constraints.measured import from_flags
 from unconstrain.errors import DataError
 
@@ -78,7 +78,13 @@ def obstacle_distances(positions: ArrayLike, obstacles: Iterable[Obstacle]) -> A
         There are no obstacles, or one has another dimension than the positions or a negative size.
     """
     X = _check_positions(positions)
-    distances = [_distance(X, k, *obstacle) for k, obstacle in enumerate(obstacles)]
+    distances = []
+    for k, obstacle in enumerate(obstacles):
+        if not (isinstance(obstacle, tuple | list) and len(obstacle) == 2):
+            raise DataError(
+                f"obstacle {k} must be a pair (centre, size), in a list of such, got {quote(obstacle)}"
+            )
+        distances.append(_distance(X, k, *obstacle))
     if not distances:
         raise DataError("there are no obstacles: give at least one (centre, size)")
     return np.min(distances, axis=0)

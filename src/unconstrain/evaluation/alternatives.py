@@ -35,6 +35,10 @@ AS_GOOD = 0.05
 MOST_INFERRED = 3
 """Of so many views that explain most by ordinary regression it is tried what inference of contact explains."""
 
+LARGEST, LARGEST_LINEAR = 300, 1500
+"""Parameters of a linear policy of the states up to which the policy's own model is tried, and a linear one: of many
+dimensions fits take minutes."""
+
 LINEAR = "a linear model"
 
 SMOOTHED = 0.4
@@ -53,7 +57,7 @@ class Alternative:
     meaning : str
         What it is, in words: "velocity".
     option : str
-        Of reading the recordings, as in Python: "order=2".
+        Of `unconstrain fit`: "--order 2".
     explained : float
         Share explained of what held-out recordings show.
     """
@@ -98,9 +102,9 @@ def try_alternatives(
             view = _thin(make(), jumps)
         except UnconstrainError:  # episodes too short to be differentiated, say
             continue
-        for model, name in _list_models(policy, meaning):
-            limit = "" if jumps is None else f"max_speed={jumps.max_speed:g}"
-            option = " and ".join(word for word in (limit, options, name) if word)
+        for model, name in _list_models(policy, meaning, view):
+            limit = "" if jumps is None else f"--max-speed {jumps.max_speed:g}"
+            option = " ".join(word for word in (limit, options, name) if word)
             explained = _explain(model, "direct", view)
             if explained is not None:
                 views.append((Alternative(meaning, option, explained), model, view))
@@ -127,13 +131,16 @@ def _explain(model: Policy, risk: str, view: Demonstrations) -> float | None:
     return row.explained
 
 
-def _list_models(policy: Policy, meaning: str) -> list[tuple[Policy, str]]:
-    """List the models to be tried: the policy's own, and the simplest."""
+def _list_models(policy: Policy, meaning: str, view: Demonstrations) -> list[tuple[Policy, str]]:
+    """List the models to be tried: the policy's own, unless that takes long, and the simplest."""
+    size = view.actions.shape[1] * (view.states.shape[1] + 1)
     own = clone(policy).set_params(space=None, scale=None, noise=None)
     simplest = ParametricPolicy(alpha=policy.alpha)
-    if isinstance(policy, ParametricPolicy) and policy.features is None:
-        return [(own, "")] if meaning != LINEAR else []
-    return [(own, ""), (simplest, "model=linear")] if meaning != LINEAR else [(simplest, "model=linear")]
+    is_simplest = isinstance(policy, ParametricPolicy) and policy.features is None
+    models = [] if meaning == LINEAR or size > LARGEST else [(own, "")]
+    if size <= LARGEST_LINEAR and not (is_simplest and (models or meaning == LINEAR)):
+        models.append((simplest, "" if is_simplest else "--model linear"))
+    return models
 
 
 def choose_missing(explained: float, tried: list[Alternative]) -> Alternative | None:
@@ -161,26 +168,26 @@ def _list_views(
 ) -> Iterator[tuple[str, str, Callable[[], Demonstrations]]]:
     space, time = demos.space, demos.time
     if find_jumps(demos.actions) is not None and time is not None:
-        yield "no jumps of the tracker", "", lambda: demos
+        yield "its fastest samples left out", "", lambda: demos
     else:
         yield LINEAR, "", lambda: demos
     moves = demos.actions.shape[1] == space.n_actions
     several = demos.n_episodes > 1
     first_order = not isinstance(space, SecondOrder)
     if several and moves and "relative_to" not in without:
-        yield "where it ends, the goal", "relative_to=goal", lambda: _relate(demos, GOAL)
-        yield "where it starts", "relative_to=start", lambda: _relate(demos, START)
+        yield "where it ends (the goal)", "--relative-to goal", lambda: _relate(demos, GOAL)
+        yield "where it starts", "--relative-to start", lambda: _relate(demos, START)
     if time is None or not first_order:
         return
     if isinstance(space, Numbers) and moves and "moving_centre" not in without:
         turn = find_turn(demos)
         if turn is not None:
             seconds = float(f"{SMOOTHED * turn:.2g}")
-            yield "a centre that moves", f"moving_centre={seconds:g}", lambda: _centre(demos, seconds)
+            yield "a centre that moves", f"--moving-centre {seconds:g}", lambda: _centre(demos, seconds)
     if moves and "order" not in without:
-        yield "velocity", "order=2", lambda: _accelerate(demos)
+        yield "velocity", "--order 2", lambda: _accelerate(demos)
     if "phase" not in without and not isinstance(space, Phased):
-        yield "phase, how far it has come", "phase=True", lambda: add_phase(demos)
+        yield "phase (how far it has come)", "--phase", lambda: add_phase(demos)
 
 
 def find_turn(demos: Demonstrations) -> float | None:

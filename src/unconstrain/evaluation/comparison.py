@@ -29,6 +29,9 @@ COMPARED = ("adaptive", "inconsistency", "direct")
 NOTICEABLE = 0.01
 """A held-out error that is lower by less than this share is called no better: rounding reaches so far."""
 
+ROUNDING = 1e-6
+"""What may be left unexplained by a policy that nothing is better than."""
+
 SURE, MUCH = 2.0, 0.5
 """Standard errors, over folds, by which it must be lower too, as in a fold or two anything may happen; unless it is
 lower by this share in the middle one."""
@@ -79,6 +82,8 @@ class Comparison:
         shown, in all and in the middle fold: that measure forgives what was inferred to be constrained, and a policy
         that loses by it all the same has inferred what is not there.
         """
+        if self.kept.explained > 1 - ROUNDING:
+            return None
         beaten_by = [
             risk
             for risk, row in self.rows.items()
@@ -187,6 +192,7 @@ def evaluate_held_out(
     compared: Comparison,
     demos: Demonstrations,
     *,
+    stable: Policy | None = None,
     label: str = "taken",
     without: Collection[str] = (),
     progress: Callable[[str], None] | None = None,
@@ -199,6 +205,8 @@ def evaluate_held_out(
         Of these recordings.
     demos : Demonstrations
         N samples.
+    stable : Policy, optional
+        The policy made to end at its goal, which is followed in its place.
     label : str
         What becomes of the policy, for its line of the table.
     without : collection of str
@@ -229,19 +237,27 @@ def evaluate_held_out(
         )
     ]
     found = collect(
-        policy,
+        policy if stable is None else stable,
         demos,
         "held-out episodes" if demos.n_episodes > 1 else "held-out blocks",
         judge=judge,
         own=scores[0],
         regression=next((each for each in scores if each.name.startswith(REGRESSION)), None),
         typical=find_typical(U, policy.scaled(compared.predictions[kept]), judge, demos.episodes),
-        free=None if policy.solution_.belief is None else policy.free_share_,
-        determined=identifiability(policy, demos).determined_share,
+        free=None if policy.solution_.belief is None else scores[0].free,
+        determined=_find_determined(policy, demos),
         without=without,
         progress=progress,
     )
     return Evaluation((*scores, score_still(U, judge)), conclude(found))
+
+
+def _find_determined(policy: Policy, demos: Demonstrations) -> float | None:
+    """Find the share of the policy that recordings determine; None by ordinary regression, to which all was free."""
+    if policy.risk == "direct":
+        return None
+    policy.determined_share_ = identifiability(policy, demos).determined_share  # for later evaluations
+    return policy.determined_share_
 
 
 def _list_likelihoods(compared: Comparison) -> dict[str, float]:

@@ -14,6 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 from unconstrain import metrics
 from unconstrain.constraints.nullspace import in_metric
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.diagnostics import identifiability
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.evaluation.contact import Contact, find_contact
 from unconstrain.evaluation.findings import collect
@@ -219,6 +220,11 @@ def evaluate(
     free = contact.free
     judge = Judge(OF_WHAT_IS_SHOWN, free, _projections(policy, demos))
     remarks = [*_describe_noise(policy, contact)]
+    if len(demos) == policy.n_samples_seen_:
+        remarks.append(
+            f"these are {len(demos)} samples, as many as it was learnt from: if they are the same, this says "
+            "nothing of others"
+        )
     regression, said = _score_regression(policy, demos, U, judge)
     remarks += said
     total = score(POLICY, U, P, judge, contact.log_likelihood)
@@ -238,6 +244,7 @@ def evaluate(
         regression=regression,
         typical=find_typical(U, P, judge, demos.episodes),
         free=float(free.mean()) if policy.solution_.belief is not None else None,
+        determined=_find_determined(policy),
         without=without,
         progress=progress,
     )
@@ -311,6 +318,16 @@ NONSENSE = 10.0
 
 NOISIER = 3.0
 """By how much the noise has to be larger than in the recordings learnt from, for a remark."""
+
+
+def _find_determined(policy: Policy) -> float | None:
+    """Return the share of the policy that what it was learnt from determines, where it is known or can be found."""
+    if policy.determined_share_ is not None or policy.risk == "direct":
+        return policy.determined_share_
+    try:
+        return identifiability(policy).determined_share
+    except (PolicyError, DataError):  # it was saved without its sums
+        return None
 
 
 def _projections(policy: Policy, demos: Demonstrations) -> np.ndarray | None:

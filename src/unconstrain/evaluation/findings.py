@@ -7,13 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.evaluation.alternatives import Alternative, choose_missing, find_turn, try_alternatives
+from unconstrain.evaluation.alternatives import Alternative, choose_missing, try_alternatives
 from unconstrain.evaluation.fixed import find_fixed
-from unconstrain.evaluation.following import Following, follow
+from unconstrain.evaluation.following import Following, find_remedy, follow
 from unconstrain.evaluation.scores import Score
 from unconstrain.judging import Judge
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inferred import is_in_doubt
+from unconstrain.stability import Stability
+
+KNOWN = 0.5
+"""Share of samples whose constraint is known, from which on the constraint is not one that varies."""
 
 WELL = 0.9
 """Share explained of what was held out from which on nothing seems to be missing."""
@@ -25,6 +29,8 @@ class Findings:
 
     Parameters
     ----------
+    n_samples : int
+        How many samples that is based on.
     explained, regression : float
         Share explained of what held-out recordings show, by the policy and by ordinary regression; NaN where nothing
         moves or it is not known.
@@ -36,12 +42,18 @@ class Findings:
         Share of samples inferred to be free; None where it was not inferred.
     known : float
         Share of samples whose constraint was known, and not inferred.
+    is_kinematic : bool
+        Whether actions are velocities, or accelerations, of the states.
+    has_time : bool
+        Whether it is known when samples were taken.
     is_regression : bool
         Whether the policy is ordinary regression, by its risk or since no constraint was found.
     in_doubt : bool
         Whether constraints are likely that the model is too coarse to tell.
     fixed : tuple of str
         Equations that all motion obeys.
+    n_actions : int
+        How many actions there are, d.
     tried : tuple of Alternative
         What was tried in place of the position alone.
     missing : Alternative or None
@@ -50,27 +62,31 @@ class Findings:
         Share of the policy that the recordings determine; None where it was not looked at.
     following : Following or None
         Where it leads from recorded starts.
-    is_stabilized : bool
-        Whether the policy is one that ends at its goal.
-    repeats : bool
-        Whether the movement repeats itself, and has no goal.
+    remedy : str
+        What keeps the movement where it was recorded, where it leaves that.
+    goal_distance : float
+        How far the goal of a stabilised policy lies from what was recorded, in units of how far movements may lead.
     """
 
+    n_samples: int
     explained: float
     regression: float
     held_out: str
     typical: float = math.nan
     free: float | None = None
     known: float = 0.0
+    is_kinematic: bool = True
+    has_time: bool = True
     is_regression: bool = False
     in_doubt: bool = False
     fixed: tuple[str, ...] = ()
+    n_actions: int = 1
     tried: tuple[Alternative, ...] = ()
     missing: Alternative | None = None
     determined: float | None = None
     following: Following | None = None
-    is_stabilized: bool = False
-    repeats: bool = False
+    remedy: str = ""
+    goal_distance: float = 0.0
 
 
 def collect(
@@ -124,22 +140,29 @@ def collect(
         tried = try_alternatives(policy, demos, without=without, progress=progress)
     if progress is not None:
         progress("following it from recorded starts")
+    known = _share_known(judge)
+    # Freely, a policy that was told its constraints leads where these never let it.
+    following = follow(policy, demos) if known < KNOWN else None
     return Findings(
+        n_samples=len(demos),
         explained=own.shown,
         regression=rival,
         held_out=held_out,
         free=free,
         typical=typical,
-        known=_share_known(judge),
+        known=known,
+        is_kinematic=policy.n_actions_ == policy.space_.n_actions,
+        has_time=demos.time is not None,
         is_regression=policy.risk == "direct",
         in_doubt=is_in_doubt(policy),
         fixed=find_fixed(demos),
+        n_actions=policy.n_actions_,
         tried=tuple(tried),
         missing=choose_missing(best, tried),
         determined=determined,
-        following=follow(policy, demos),
-        is_stabilized=policy.stability_ is not None,
-        repeats=demos.time is not None and find_turn(demos) is not None,
+        following=following,
+        remedy=find_remedy(policy, demos) if following is not None and following.n_stopped else "",
+        goal_distance=_measure_goal(policy),
     )
 
 
@@ -148,3 +171,11 @@ def _share_known(judge: Judge) -> float:
     if judge.projections is None:
         return 0.0
     return float(np.mean(~np.isnan(judge.projections).any(axis=(1, 2))))
+
+
+def _measure_goal(policy: Policy) -> float:
+    """Return how far the goal of a stabilised policy lies from what was recorded; 0 where it has none."""
+    if not isinstance(policy.stability_, Stability):
+        return 0.0
+    goal = np.atleast_2d(policy.stability_.goal)
+    return float(policy.distance(goal)[0]) / max(1.0, policy.usual_distance())

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import UnconstrainError
+from unconstrain.evaluation.alternatives import find_turn
 from unconstrain.policies.base import Policy
 from unconstrain.stopping import MovementStopped
 
@@ -61,3 +63,32 @@ def follow(policy: Policy, demos: Demonstrations) -> Following | None:
         movement = policy.rollout(demos.states[firsts], steps, dt)
     stops = [each.time for each in movement.stopped if each.time <= durations[each.episode]]
     return Following(len(firsts), len(stops), min(stops, default=np.nan))
+
+
+def find_remedy(policy: Policy, demos: Demonstrations) -> str:
+    """Find what would keep a policy's movements where they were recorded.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    demos : Demonstrations
+        What it is followed on.
+
+    Returns
+    -------
+    str
+        An option of `fit`, and what it does; empty where there is none.
+    """
+    if policy.stability_ is not None:
+        return ""
+    ways = [("end", "makes it end where episodes do")]
+    if demos.time is not None and find_turn(demos) is not None:
+        ways.insert(0, ("cycle", "keeps it on its cycle"))
+    for to, does in ways:
+        try:
+            policy.stabilized(to, demos)
+        except UnconstrainError:
+            continue
+        return f"`fit --stable-at {to}` {does}"
+    return ""

@@ -3,13 +3,16 @@
 import math
 from dataclasses import dataclass
 
-from unconstrain.evaluation.findings import WELL, Findings
+from unconstrain.evaluation.findings import KNOWN, WELL, Findings
 
 BARELY = 0.5
 """Share explained of what was held out; with less, too much is left that looks like anything."""
 
 LITTLE = 0.01
 """A difference in what is explained that is not worth a word."""
+
+FEWEST = 20
+"""Samples, of which fewer tell nothing."""
 
 DETERMINED = 0.9
 """Share of the policy that recordings have to determine, or else the rest is named."""
@@ -55,9 +58,13 @@ def conclude(found: Findings) -> Verdict:
         return Verdict(False, False, "nothing moves in these recordings, so they say nothing of a policy")
     against = _list_objections(found)
     explained, constraints = _describe_explained(found), _describe_constraints(found)
+    not_followed = _describe_not_followed(found)
     if against:
         head = "not for a robot yet: "
         clauses = [*against, constraints] if found.explained < WELL else [*against, constraints, explained]
+    elif not_followed:
+        head = "nothing found speaks against a robot, but "
+        clauses = [not_followed, constraints, explained]
     else:
         head = "safe to try on a robot, slowly: "
         clauses = [constraints, explained, _describe_following(found)]
@@ -65,34 +72,33 @@ def conclude(found: Findings) -> Verdict:
         clauses.append(
             f"all motion obeys {' and '.join(found.fixed)}, so nothing is known of the policy across that"
         )
-    return Verdict(
-        not against, found.explained >= BARELY, head + "; ".join(clause for clause in clauses if clause)
-    )
+    sentence = head + "; ".join(clause for clause in clauses if clause)
+    return Verdict(not (against or not_followed), max(found.explained, found.typical) >= BARELY, sentence)
 
 
 def _list_objections(found: Findings) -> list[str]:
     against = []
+    if found.n_samples < FEWEST:
+        against.append(f"{found.n_samples} samples are too few to judge by")
     if found.explained < WELL:
         against.append(_describe_missing(found))
-    if found.determined is not None and found.determined < DETERMINED:
+    # What a constraint that never varies hides is said by itself.
+    open_to_see = 1 - len(found.fixed) / found.n_actions
+    if found.determined is not None and found.determined < DETERMINED * open_to_see:
         against.append(
-            f"{1 - found.determined:.0%} of the policy is not determined by these recordings, and `unconstrain "
-            "diagnose` says where and what to record next"
+            f"{1 - found.determined:.0%} of the policy is not determined by what it was learnt from (`unconstrain "
+            "diagnose` says where, and what to record next)"
         )
+    if found.goal_distance > 1:
+        against.append("its goal lies outside of what was recorded")
     following = found.following
     if following is not None and following.n_stopped:
         where = (
             f"from {following.n_stopped} of {following.n_starts} recorded starts it leaves what was recorded, first "
             f"after {following.first:.2g} s"
         )
-        against.append(where if found.is_stabilized else f"{where} ({_describe_remedy(found)})")
+        against.append(f"{where} ({found.remedy})" if found.remedy else where)
     return against
-
-
-def _describe_remedy(found: Findings) -> str:
-    if found.repeats:
-        return "stable_at=cycle keeps it on its cycle"
-    return "stable_at=end makes it end at the goal, where there is one"
 
 
 def _describe_missing(found: Findings) -> str:
@@ -103,7 +109,10 @@ def _describe_missing(found: Findings) -> str:
             "it is of no use until more is recorded"
         )
     if missing is not None:
-        return f"{explained}, and with {missing.meaning} it would be some {missing.explained:.0%} ({missing.option})"
+        return (
+            f"{explained}, and fitted to them with {missing.meaning} it would be some {missing.explained:.0%} "
+            f"(`fit {missing.option}`)"
+        )
     if found.tried:
         best: dict[str, float] = {}
         for each in found.tried:
@@ -117,21 +126,21 @@ def _describe_missing(found: Findings) -> str:
 
 
 def _describe_constraints(found: Findings) -> str:
+    if found.known >= KNOWN:
+        return f"what was in the way is known of {found.known:.0%} of the samples"
     if found.in_doubt:
         if found.explained < BARELY:
             return ""  # what is not explained at all looks like anything
-        return "some samples look constrained, but the model is too coarse to tell: try more centres or another kind"
+        return "no varying constraint was found, nor ruled out: some samples look constrained"
     if found.free is None:
         return (
             "it is ordinary regression, right only if nothing was in the way"
             if found.is_regression
             else "every sample was taken for constrained"
         )
-    if found.known > 1 - LITTLE / 2:
-        return "what was in the way of each sample was known"
     if found.is_regression or found.free > 1 - LITTLE / 2:
         return "no varying constraint was found"
-    return f"a varying constraint bent {1 - found.free:.0%} of the samples"
+    return f"a varying constraint seems to have bent {1 - found.free:.0%} of the samples"
 
 
 def _describe_explained(found: Findings) -> str:
@@ -143,12 +152,24 @@ def _describe_explained(found: Findings) -> str:
         return by
     if abs(gain) < LITTLE:
         return f"{by}, as does ordinary regression"
-    return f"{by}, where ordinary regression explains {max(found.regression, 0.0):.1%}"
+    other = " (`fit --risk direct`)" if gain < 0 else ""
+    return f"{by}, where ordinary regression{other} explains {max(found.regression, 0.0):.1%}"
+
+
+def _describe_not_followed(found: Findings) -> str:
+    if found.following is not None:
+        return ""
+    if found.known >= KNOWN:
+        return "it was not followed, as it moves under the constraint that is known (`rollout --constraint`)"
+    if not found.is_kinematic:
+        return "it was not followed, as actions are not velocities of the states"
+    if not found.has_time:
+        return "it was not followed, as the recordings have no time"
+    return "it was not followed, as the recordings are too short"
 
 
 def _describe_following(found: Findings) -> str:
     following = found.following
-    if following is None:
-        return "not rolled out, as the recordings have no time, or actions are not velocities of the states"
+    assert following is not None
     starts = "the recorded start" if following.n_starts == 1 else f"{following.n_starts} recorded starts"
-    return f"from {starts} it stays near what was recorded"
+    return f"from {starts} it stays near what was recorded, as long as that took"

@@ -60,6 +60,8 @@ class Policy(RegressorMixin, BaseEstimator):
     accumulator_ : Accumulator
         The sums they were solved from. A policy loaded from a file has them only where it was saved with
         `resumable=True`.
+    determined_share_ : float or None
+        Share of the policy that the recordings it was compared on determine, where `evaluate_held_out` has looked.
     stability_ : Stability, Cycle or None
         What makes the policy end at a goal, or go round and round, in one that `stabilized` returned.
     """
@@ -75,6 +77,7 @@ class Policy(RegressorMixin, BaseEstimator):
     actions_are_scalars_: bool
     n_features_in_: int
     stability_: "Stability | Cycle | None" = None
+    determined_share_: float | None = None
 
     @abstractmethod
     def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
@@ -196,6 +199,7 @@ class Policy(RegressorMixin, BaseEstimator):
         samples, _ = check_input(fresh, X, y, groups, sample_weight, projections, first=False)
         accumulator.longest = max(accumulator.longest, accumulator.total.longest)
         accumulator.record = replace(accumulator.record, regression=None)  # to which nothing was added
+        fresh.determined_share_ = None
         accumulator.add(samples)
         if accumulator.total.misjudged:
             raise DataError(
@@ -975,6 +979,7 @@ class Policy(RegressorMixin, BaseEstimator):
         fresh = copy(self)
         if fresh.stability_ is not None:
             fresh.stability_ = None
+        fresh.determined_share_ = None
         return fresh
 
     def _in_own_units(self, scaled: np.ndarray) -> np.ndarray:

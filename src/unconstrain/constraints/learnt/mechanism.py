@@ -91,7 +91,7 @@ class MechanismConstraint(LearntConstraint):
         return self._take(find_mechanism(X, episodes=groups, play=self.play), U, X)
 
     def _take(self, found: Mechanism, U: np.ndarray, X: np.ndarray) -> Self:
-        if not found.shapes:
+        if found.kind == "none" or not found.shapes:
             raise DataError(
                 "no mechanism explains these positions, neither a drawer, a hinge, a plane, a sphere nor a cylinder; "
                 "give play= if they may stray further, or find rows of another kind"

@@ -67,6 +67,11 @@ def test_fit_takes_forces_and_flags(run, table):
     assert "75.0% in contact, 25.0% free" in out
     assert "verdict: " in out
     assert uc.load_policy("policy.skops").n_known_constraints_ > 0
+    for command in (["evaluate", "policy.skops"], ["diagnose"]):
+        more = ["--model", "linear"] if command == ["diagnose"] else []
+        code, out, err = run(*command, "table.csv", *table, *more, *forces)
+        assert code == 0, err
+        assert "what was in the way is known of 100% of the samples" in out
     code, out, _ = run("fit", "table.csv", *table, "--model", "linear", "--free", "free", "--overwrite")
     assert "known of 25.0%" in out
 

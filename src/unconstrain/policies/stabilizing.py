@@ -89,8 +89,8 @@ def _learn_cycle(policy: "Policy", demos: Any, hold: float | None) -> Cycle:
     """Learn what makes a policy go round and round."""
     if not isinstance(demos, Demonstrations) or demos.time is None:
         raise DataError(
-            'a cycle is found in demonstrations with their times: give these, stabilized("cycle", demos), or fit with '
-            "--stable-at cycle and --time on the command line"
+            "a cycle is found in demonstrations with their times, so a policy is put on one where it is fitted: "
+            '`unconstrain fit --stable-at cycle --time ...`, in Python policy.stabilized("cycle", demos)'
         )
     X = _find_states(policy, demos)
     hold = _check_hold(demos, hold)

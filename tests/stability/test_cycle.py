@@ -83,7 +83,7 @@ def test_the_program_says_how_a_movement_goes_round(tmp_path, monkeypatch, capsy
     [
         (lambda d: d.select(slice(0, 60)), r"do not go round and round: 0\.8"),
         (lambda d: d.select(np.r_[0:90, 90:0:-1, 0:90]), "do not go round and round"),
-        (lambda d: d.states, "give these, stabilized"),
+        (lambda d: d.states, "put on one where it is fitted"),
     ],
     ids=["too short", "to and fro", "no times"],
 )

@@ -1,6 +1,7 @@
 """The program: a command an experiment, each with its own options."""
 
 import os
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -340,4 +341,5 @@ def _console() -> "Console":
     """Make a console that takes text literally: brackets in names of files are no markup."""
     from rich.console import Console
 
-    return Console(markup=False, highlight=False)
+    width = None if sys.stdout.isatty() else reporting.WIDTH
+    return Console(markup=False, highlight=False, width=width)

@@ -164,8 +164,8 @@ class Selection:
     name: str
     table: Table
     policies: dict[str, Policy] = field(repr=False)
-    predictions: dict[str, np.ndarray] = field(repr=False, default_factory=dict)
-    judge: Judge | None = field(repr=False, default=None)
+    predictions: dict[str, np.ndarray] = field(repr=False)
+    judge: Judge = field(repr=False)
 
     def __str__(self) -> str:
         return f"{self.table}\n\nchosen: {self.name}"

@@ -4,6 +4,7 @@ import pytest
 import unconstrain as uc
 from unconstrain.demo import draw_recordings, make_policy
 from unconstrain.evaluation import Comparison, compare_risks, evaluate_held_out
+from unconstrain.judging import Judge
 from unconstrain.limit_cycle import demonstrate
 from unconstrain.selection import Row
 
@@ -80,7 +81,8 @@ def compared(**shares):
         )
         for risk, each in shares.items()
     }
-    return Comparison(RBF, rows, "")
+    judge = Judge("", np.ones(1))
+    return Comparison(RBF, rows, "", policies={}, predictions={}, judge=judge)
 
 
 def test_ordinary_regression_only_has_to_explain_more_in_all_and_in_the_middle_fold():

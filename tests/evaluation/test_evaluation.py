@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import unconstrain as uc
-from unconstrain.evaluation.alternatives import choose_missing, find_turn, try_alternatives
+from unconstrain.evaluation.alternatives import choose_missing, try_alternatives
 from unconstrain.evaluation.jumps import find_jumps
+from unconstrain.evaluation.turns import find_turn
 from unconstrain.limit_cycle import demonstrate
 
 RBF = uc.ParametricPolicy(uc.NormalizedRBF())
@@ -67,7 +68,9 @@ def test_regression_of_what_known_constraints_let_through_is_not_ordinary():
     demos = demonstrate(6, random_state=0)
     told, direct = (uc.ParametricPolicy(risk=risk).fit(demos) for risk in ("adaptive", "direct"))
     assert told.n_known_constraints_ == len(demos)
-    assert np.allclose(told.ordinary_regression().predict(demos.states), direct.predict(demos.states))
+    known = told.ordinary_regression()
+    assert np.allclose(known.predict(demos.states), direct.predict(demos.states))
+    assert known.distance(demos.states[:1])[0] == 0.0
 
 
 def test_arrays_will_do_and_nonsense_is_refused(bent):

@@ -106,7 +106,7 @@ def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
             f"note: --risk {policy.risk} is better on what was held out, so it is taken; --risk adaptive keeps what "
             "was inferred all the same"
         )
-    elif evaluation.regression.shown > evaluation.policy.shown + LITTLE:
+    elif evaluation.regression is not None and evaluation.regression.shown > evaluation.policy.shown + LITTLE:
         reporting.say(
             "note: ordinary regression explains more in all, but not in the middle fold, so --risk adaptive is taken; "
             "--risk direct takes the other"

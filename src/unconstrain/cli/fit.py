@@ -114,8 +114,8 @@ def fit(
         if inferred:
             reporting.say(inferred)
         reporting.say(
-            "not compared with ordinary regression, as this was a stream: to compare, fit with `--risk direct` too, "
-            "and `unconstrain evaluate` both"
+            "not compared with ordinary regression, as this was a stream: `unconstrain evaluate` compares both on "
+            "recordings that were held back"
         )
         _suggest(out)
         return

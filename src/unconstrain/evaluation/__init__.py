@@ -7,6 +7,7 @@ contact.py       which samples of other recordings were free, and how likely the
 alternatives.py  what else than the position may explain a motion, tried
 fixed.py         equations that all motion obeys
 following.py     where a policy leads from recorded starts
+turns.py         whether a movement repeats itself
 jumps.py         whether a few samples hold most of the motion
 findings.py      all of these together
 verdict.py       what all of it comes to, in a sentence

@@ -10,6 +10,7 @@ from sklearn.base import clone
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.evaluation.jumps import Jumps, find_jumps
+from unconstrain.evaluation.turns import find_turn
 from unconstrain.policies import ParametricPolicy
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inferred import finds_no_contact
@@ -43,9 +44,6 @@ LINEAR = "a linear model"
 
 SMOOTHED = 0.4
 """Standard deviation over which a centre is smoothed, in turns: 4 % of a turn is left in it."""
-
-LEAST_TURNS = 3
-"""An episode has to hold so many turns, or else it is not taken for a movement that repeats itself."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,8 @@ def try_alternatives(
     """
     views = []
     jumps = find_jumps(demos.actions) if demos.time is not None else None
-    for meaning, options, make in _list_views(demos, without):
+    limit = "" if jumps is None else f"--max-speed {jumps.max_speed:g}"
+    for meaning, options, make in _list_views(demos, jumps, without):
         if progress is not None:
             progress(f"trying {meaning}")
         try:
@@ -103,7 +102,6 @@ def try_alternatives(
         except UnconstrainError:  # episodes too short to be differentiated, say
             continue
         for model, name in _list_models(policy, meaning, view):
-            limit = "" if jumps is None else f"--max-speed {jumps.max_speed:g}"
             option = " ".join(word for word in (limit, options, name) if word)
             explained = _explain(model, "direct", view)
             if explained is not None:
@@ -164,10 +162,10 @@ def choose_missing(explained: float, tried: list[Alternative]) -> Alternative | 
 
 
 def _list_views(
-    demos: Demonstrations, without: Collection[str]
+    demos: Demonstrations, jumps: Jumps | None, without: Collection[str]
 ) -> Iterator[tuple[str, str, Callable[[], Demonstrations]]]:
     space, time = demos.space, demos.time
-    if find_jumps(demos.actions) is not None and time is not None:
+    if jumps is not None:
         yield "its fastest samples left out", "", lambda: demos
     else:
         yield LINEAR, "", lambda: demos
@@ -188,39 +186,6 @@ def _list_views(
         yield "velocity", "--order 2", lambda: _accelerate(demos)
     if "phase" not in without and not isinstance(space, Phased):
         yield "phase (how far it has come)", "--phase", lambda: add_phase(demos)
-
-
-def find_turn(demos: Demonstrations) -> float | None:
-    """Find how long a turn takes of a movement that repeats itself.
-
-    The period at which the power of the actions' spectrum is largest, the middle of all episodes'.
-
-    Parameters
-    ----------
-    demos : Demonstrations
-        With time.
-
-    Returns
-    -------
-    float or None
-        Seconds; None where episodes hold less than three turns.
-    """
-    turns = []
-    for k in range(demos.n_episodes):
-        episode = demos.select(demos.episodes == k)
-        assert episode.time is not None
-        if len(episode) < 8:
-            continue
-        duration = float(episode.time[-1] - episode.time[0])
-        even = np.linspace(episode.time[0], episode.time[-1], len(episode))
-        U = np.stack([np.interp(even, episode.time, u) for u in episode.actions.T], axis=1)
-        power = np.sum(np.abs(np.fft.rfft(U - U.mean(axis=0), axis=0)) ** 2, axis=1)
-        turns.append((duration / np.argmax(power) if power.any() else np.inf, duration))
-    if not turns:
-        return None
-    periods, durations = np.array(turns).T
-    period = float(np.median(periods))
-    return period if np.median(durations) >= LEAST_TURNS * period and period > 0 else None
 
 
 def _relate(demos: Demonstrations, to: str) -> Demonstrations:

@@ -51,23 +51,23 @@ class Comparison:
         could not be fitted.
     measure : str
         What all are judged by, in words.
-    chosen : Table or None
-        How the policy was chosen, if it was.
     policies : dict of str to Policy
         By risk, those that could be fitted; each knows ordinary regression.
     predictions : dict of str to ndarray of shape (N, d)
         Their predictions of actions held out.
     judge : Judge
         By which all of them were judged.
+    chosen : Table or None
+        How the policy was chosen, if it was.
     """
 
     policy: Policy
     rows: dict[str, Row]
     measure: str
+    policies: dict[str, Policy] = field(repr=False)
+    predictions: dict[str, np.ndarray] = field(repr=False)
+    judge: Judge = field(repr=False)
     chosen: Table | None = None
-    policies: dict[str, Policy] = field(repr=False, default_factory=dict)
-    predictions: dict[str, np.ndarray] = field(repr=False, default_factory=dict)
-    judge: Judge | None = field(repr=False, default=None)
 
     @property
     def kept(self) -> Row:
@@ -170,10 +170,10 @@ def compare_risks(
         result.policies[policy.risk],
         rows,
         result.table.measure,
-        chosen,
         result.policies,
         result.predictions,
         result.judge,
+        chosen,
     )
 
 
@@ -220,44 +220,38 @@ def evaluate_held_out(
         The policy, the other risks, standing still, and a verdict.
     """
     policy, judge = compared.policy, compared.judge
-    assert judge is not None
     U = policy.scaled(demos.actions)
     likelihoods = _list_likelihoods(compared)
     kept = policy.risk
-    scores = [
-        score(
+    scores = {
+        risk: score(
             _name(risk, label, is_kept=risk == kept),
             U,
             policy.scaled(compared.predictions[risk]),
             judge,
             likelihoods.get(risk, np.nan),
         )
-        for risk in sorted(
-            compared.predictions, key=lambda risk: (risk != kept, list(compared.rows).index(risk))
-        )
-    ]
+        for risk in sorted(compared.rows, key=lambda risk: risk != kept)  # the one that is kept first
+        if risk in compared.predictions
+    }
+    # By ordinary regression, to which all was free, everything is.
+    determined = None if kept == "direct" else identifiability(policy, demos).determined_share
+    policy.determined_share_ = determined  # for later evaluations
     found = collect(
         policy if stable is None else stable,
         demos,
         "held-out episodes" if demos.n_episodes > 1 else "held-out blocks",
         judge=judge,
-        own=scores[0],
-        regression=next((each for each in scores if each.name.startswith(REGRESSION)), None),
+        own=scores[kept],
+        regression=scores.get("direct"),
         typical=find_typical(U, policy.scaled(compared.predictions[kept]), judge, demos.episodes),
-        free=None if policy.solution_.belief is None else scores[0].free,
-        determined=_find_determined(policy, demos),
+        free=None if policy.solution_.belief is None else scores[kept].free,
+        determined=determined,
         without=without,
         progress=progress,
     )
-    return Evaluation((*scores, score_still(U, judge)), conclude(found))
-
-
-def _find_determined(policy: Policy, demos: Demonstrations) -> float | None:
-    """Find the share of the policy that recordings determine; None by ordinary regression, to which all was free."""
-    if policy.risk == "direct":
-        return None
-    policy.determined_share_ = identifiability(policy, demos).determined_share  # for later evaluations
-    return policy.determined_share_
+    rows = (*scores.values(), score_still(U, judge))
+    return Evaluation(rows, scores.get("direct"), conclude(found))
 
 
 def _list_likelihoods(compared: Comparison) -> dict[str, float]:

@@ -27,6 +27,12 @@ from unconstrain.selection import select_policy
 if TYPE_CHECKING:
     import pandas
 
+NOISIER = 3.0
+"""By how much the noise has to be larger than in the recordings learnt from, for a remark."""
+
+NONSENSE = 10.0
+"""Shares explained that are below minus this are written without decimals."""
+
 POLICY, REGRESSION, STILL = "policy", "ordinary regression", "standing still"
 COLUMNS = (
     "",
@@ -50,6 +56,8 @@ class Evaluation:
     ----------
     scores : tuple of Score
         The policy first, then what it is held against: ordinary regression, other risks, standing still.
+    regression : Score or None
+        That of ordinary regression, which is the policy's own if it is that; None where it could not be fitted.
     verdict : Verdict
         What it comes to.
     episodes : tuple of Score
@@ -65,6 +73,7 @@ class Evaluation:
     """
 
     scores: tuple[Score, ...]
+    regression: Score | None
     verdict: Verdict
     episodes: tuple[Score, ...] = ()
     n_more: int = 0
@@ -76,11 +85,6 @@ class Evaluation:
     def policy(self) -> Score:
         """The policy's own errors, on all samples."""
         return self.scores[0]
-
-    @property
-    def regression(self) -> Score:
-        """Those of ordinary regression."""
-        return next(each for each in self.scores if each.name.startswith(REGRESSION))
 
     def rows(self) -> list[tuple[str, ...]]:
         """List the cells of the table under `COLUMNS`.
@@ -193,8 +197,8 @@ def evaluate(
     Notes
     -----
     Ordinary regression is that of the samples that the policy has learnt from, where it knows it
-    (`Policy.ordinary_regression`). Otherwise it is learnt from these recordings, and held out by episode, which favours
-    it, and is said.
+    (`Policy.ordinary_regression`). Otherwise it is learnt from these recordings alone, each episode predicted by the
+    others, and that is said.
 
     Examples
     --------
@@ -250,6 +254,7 @@ def evaluate(
     )
     return Evaluation(
         (total, regression, score_still(U, judge)),
+        regression,
         conclude(found),
         tuple(episodes),
         demos.n_episodes - len(labels) if several else 0,
@@ -311,13 +316,6 @@ def _describe_noise(policy: Policy, contact: Contact) -> list[str]:
         f"the policy misses these recordings by more than those it was learnt from, {contact.noise:.3g} against "
         f"{before:.3g}: they are noisier, go where it has not been, or show something else"
     ]
-
-
-NONSENSE = 10.0
-"""Shares explained that are below this are written without decimals."""
-
-NOISIER = 3.0
-"""By how much the noise has to be larger than in the recordings learnt from, for a remark."""
 
 
 def _find_determined(policy: Policy) -> float | None:

@@ -47,7 +47,7 @@ class Findings:
     has_time : bool
         Whether it is known when samples were taken.
     is_regression : bool
-        Whether the policy is ordinary regression, by its risk or since no constraint was found.
+        Whether the policy's risk is "direct".
     in_doubt : bool
         Whether constraints are likely that the model is too coarse to tell.
     fixed : tuple of str

@@ -7,7 +7,7 @@ import numpy as np
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
-from unconstrain.evaluation.alternatives import find_turn
+from unconstrain.evaluation.turns import find_turn
 from unconstrain.policies.base import Policy
 from unconstrain.stopping import MovementStopped
 

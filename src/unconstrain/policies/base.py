@@ -835,14 +835,14 @@ class Policy(RegressorMixin, BaseEstimator):
         -------
         Policy or None
             That predicts, but cannot learn on. None where it is not known: with other risks than "adaptive" and
-            "direct", where projections were known, and after `partial_fit`, unless `compare_risks` has made it.
+            "direct", unless `compare_risks` has made it, and after `partial_fit`.
         """
         check_is_fitted(self)
         solution = self.solution_ if self.risk == "direct" else self.solution_.record.regression
         if solution is None:
             return None
         other = self._without_stability()
-        other.risk, other.solution_ = "direct", solution
+        other.risk, other.solution_ = "direct", replace(solution, regions=self.solution_.regions)
         if hasattr(other, "accumulator_"):
             del other.accumulator_
         return other

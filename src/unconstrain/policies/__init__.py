@@ -3,6 +3,14 @@
 from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
+from unconstrain.policies.regressor import RegressorPolicy
 from unconstrain.policies.saving import load_policy
 
-__all__ = ["CompiledPolicy", "LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"]
+__all__ = [
+    "CompiledPolicy",
+    "LocallyLinearPolicy",
+    "ParametricPolicy",
+    "RegressorPolicy",
+    "load_compiled",
+    "load_policy",
+]

@@ -52,7 +52,8 @@ def list_findings(results: Mapping[str, Results]) -> tuple[str, ...]:
             for name, cell in cells.items()
             if cell[WRAPPED] > MOST_TOLD * cell[TOLD]
         ]
-        sentence = f"prior {prior!r}: at most {MOST_TOLD:g} times told in {len(cells) - len(missed)} of {len(cells)} rows"
+        reached = f"{len(cells) - len(missed)} of {len(cells)} rows"
+        sentence = f"prior {prior!r}: at most {MOST_TOLD:g} times told in {reached}"
         findings.append(f"{sentence}; missed: {'; '.join(missed)}." if missed else f"{sentence}.")
         if cells:
             most = max(cell["fits"] for cell in cells.values())

@@ -13,7 +13,7 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces
+    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces, torch
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -71,6 +71,7 @@ __all__ = [
     "robots",
     "select_policy",
     "spaces",
+    "torch",
 ]
 
 _HOMES = {
@@ -111,6 +112,7 @@ _NAMESPACES = {
     "plot": "unconstrain.plot",
     "robots": "unconstrain.robots",
     "spaces": "unconstrain.spaces",
+    "torch": "unconstrain.torch",
 }
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours

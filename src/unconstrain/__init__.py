@@ -27,7 +27,13 @@ if TYPE_CHECKING:
     from unconstrain.evaluation import Evaluation, evaluate
     from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
     from unconstrain.fitting import moments
-    from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
+    from unconstrain.policies import (
+        LocallyLinearPolicy,
+        ParametricPolicy,
+        TorchPolicy,
+        load_compiled,
+        load_policy,
+    )
     from unconstrain.recordings import Columns, Inspection, Preparation, Recordings, inspect, load, open
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
@@ -52,6 +58,7 @@ __all__ = [
     "PotentialFeatures",
     "Preparation",
     "Recordings",
+    "TorchPolicy",
     "constraints",
     "distributed",
     "errors",
@@ -87,7 +94,13 @@ _HOMES = {
     "unconstrain.diagnostics": ("identifiability",),
     "unconstrain.evaluation": ("Evaluation", "evaluate"),
     "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
-    "unconstrain.policies": ("LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"),
+    "unconstrain.policies": (
+        "LocallyLinearPolicy",
+        "ParametricPolicy",
+        "TorchPolicy",
+        "load_compiled",
+        "load_policy",
+    ),
     "unconstrain.recordings": (
         "Columns",
         "Inspection",

@@ -7,14 +7,15 @@
         noise:  from the residuals of held-out samples, lowered slowly
     keep:   the simplest of "all free" and the ends whose held-out likelihood none clearly beats
 
-As for models that are linear in their parameters (`fitting.inference`), the noise is lowered from what it seems to be at
-the start, so that no sample is judged by a network that is not yet good. Unlike there it is estimated from samples that
-are held out: a network may know its own by heart. The noise of speed is not inferred, and "all constrained" is not
-fitted.
+As for models that are linear in their parameters (`fitting.inference`), the noise is lowered from what it seems to be
+at the start, so that no sample is judged by a network that is not yet good. Unlike there it is estimated from samples
+that are held out: a network may know its own by heart. The noise of speed is not inferred, and "all constrained" is
+not fitted.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -144,22 +145,24 @@ class Member:
             (3, FROM_DIRECT, self.done[FREE].weights, whole.noise.action),
             (4, FROM_INCONSISTENCY, self.done["inconsistency"].weights, quarter),
         ):
-            start = Belief((weights,), Noise(max(variance, self._floor)), drift=Drift() if d > 1 else None)
-            self._run(name, number, tell, lambda learner, start=start, name=name: self._infer(learner, name, start))  # type: ignore[misc]
+            start = believe(weights, max(variance, self._floor), drift=Drift() if d > 1 else None)
+            self._run(name, number, tell, partial(self._infer, name=name, belief=start))
         one, other = self.done[FROM_DIRECT], self.done[FROM_INCONSISTENCY]
         if abs(_likelihood(one) - _likelihood(other)) > NOTICEABLE:
             end = max(one, other, key=_likelihood).belief
             assert end is not None
             warmer = Noise(min(WARMTH * end.noise.action, quarter))
             start = replace(end, noise=warmer, chain=Chain())
-            self._run(AGAIN, 5, tell, lambda learner: self._infer(learner, AGAIN, start))
+            self._run(AGAIN, 5, tell, partial(self._infer, name=AGAIN, belief=start))
         return self.done
 
     @property
     def _floor(self) -> float:
         return max(LEAST_NOISE**2 * self.scale / self.model.n_actions, self.least)
 
-    def _run(self, name: str, number: int, tell: Callable[[str], None], run: Callable[[Learner], Candidate]) -> None:
+    def _run(
+        self, name: str, number: int, tell: Callable[[str], None], run: Callable[[Learner], Candidate]
+    ) -> None:
         if name not in self.done:
             tell(name)
             self.done[name] = run(self.begin(number))
@@ -170,10 +173,12 @@ class Member:
         knows = any(shard.N is not None for shard in learner.shards)
         weights = learner.fit(whole_loss) if knows else self.done["regression"].weights
         chain = Chain.held("free")
-        belief = Belief((weights,), Noise(self.scale / self.model.n_actions), chain=chain, held="free")
+        belief = believe(weights, self.scale / self.model.n_actions, chain=chain, held="free")
         for _ in range(ROUNDS):
             tally = self._ask(learner.shards.held_out, belief).tally
-            belief = replace(belief, noise=Noise(max(tally.squares.estimate(("action",)).action, self._floor)))
+            belief = replace(
+                belief, noise=Noise(max(tally.squares.estimate(("action",)).action, self._floor))
+            )
         return Candidate(FREE, weights, belief, self._ask(learner.shards.held_out, belief).tally)
 
     def _infer(self, learner: Learner, name: str, belief: Belief) -> Candidate:
@@ -195,17 +200,15 @@ class Member:
             if stop.is_done:
                 break
         best, tally = stop.kept
-        return Candidate(name, stop.best, replace(best, w=(stop.best,)), tally, tuple(history))
+        return Candidate(name, stop.best, best, tally, tuple(history))
 
     def _pass(self, learner: Learner, belief: Belief, *, cooling: bool) -> tuple[Belief, Tally]:
         """Infer from every shard, and descend on what was inferred; the noise is that of held-out samples."""
         residual = belief.residual or belief.noise
         total: Tally | None = None
-        n_shards = 0
         for shard in learner.shards:
             found = self._ask(shard, belief)
             total = found.tally if total is None else total + found.tally
-            n_shards += 1
             loss_of = _expected_loss(found, shard, np.sqrt(residual.action) / learner.model.unit)
             for _ in range(EPOCHS if learner.shards.in_memory else 1):
                 learner.epoch(shard, loss_of)
@@ -213,7 +216,7 @@ class Member:
         assert total is not None
         belief = replace(
             belief,
-            w=(learner.weights,),
+            w=wrap(learner.weights),
             chain=total.counts.chain(),
             drift=None if belief.drift is None else total.drifts.estimate(),
         )
@@ -230,6 +233,31 @@ class Member:
 
     def _ask(self, shard: Shard, belief: Belief) -> Found:
         return infer(self.model, belief, shard.samples)
+
+
+def wrap(weights: Weights) -> Any:
+    """Make what a model takes as parameters of the weights of one network."""
+    return (weights,)
+
+
+def believe(weights: Weights, variance: float, **options: Any) -> Belief:
+    """Make a belief of the weights of one network.
+
+    Parameters
+    ----------
+    weights : dict of str to ndarray
+        By name.
+    variance : float
+        Of the noise.
+    **options
+        As for `Belief`.
+
+    Returns
+    -------
+    Belief
+        To infer by.
+    """
+    return Belief(wrap(weights), Noise(variance), **options)
 
 
 def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str, dict[str, float]]:
@@ -249,7 +277,11 @@ def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str
     log_likelihoods : dict of str to float
         Of a held-out sample by run, the one chosen first.
     """
-    names = [name for name in (FREE, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN) if all(name in each for each in members)]
+    names = [
+        name
+        for name in (FREE, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN)
+        if all(name in each for each in members)
+    ]
     tallies = {name: _total([each[name].tally for each in members]) for name in names}
     likelihoods = {name: tally.log_likelihood / tally.n_samples for name, tally in tallies.items()}
 

@@ -257,7 +257,9 @@ def whole_loss(P: Any, shard: Shard, rows: Any) -> Any:
     Tensor
         The mean.
     """
-    return inconsistency_loss(P, shard.U[rows], _some(shard.N, rows), free=P.new_ones(len(P)), weights=_some(shard.weights, rows))
+    return inconsistency_loss(
+        P, shard.U[rows], _some(shard.N, rows), free=P.new_ones(len(P)), weights=_some(shard.weights, rows)
+    )
 
 
 def published_loss(P: Any, shard: Shard, rows: Any) -> Any:

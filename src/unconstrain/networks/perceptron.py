@@ -7,6 +7,7 @@ for standardised states z. The linear term makes linear policies exact, and what
 
 from collections.abc import Mapping
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -50,12 +51,10 @@ def evaluate(w: Mapping[str, NDArray[Any]], Z: Floats) -> Floats:
     ndarray of shape (N, d)
         In double precision.
     """
-    from scipy.special import expit
-
     h, last = Z, count_layers(w) - 1
     for k in range(last):
         a = h @ w[f"layers.{k}.weight"].T.astype(np.float64) + w[f"layers.{k}.bias"]
-        h = a * expit(a)
+        h = 0.5 * a * (1 + np.tanh(0.5 * a))
     straight = Z @ w["straight.weight"].T.astype(np.float64)
     return straight + h @ w[f"layers.{last}.weight"].T.astype(np.float64) + w[f"layers.{last}.bias"]
 
@@ -85,9 +84,7 @@ def _module() -> Any:
         def __init__(self, n: int, d: int, hidden: tuple[int, ...]) -> None:
             super().__init__()
             sizes = (n, *hidden, d)
-            self.layers = nn.ModuleList(
-                nn.Linear(a, b) for a, b in zip(sizes[:-1], sizes[1:], strict=True)
-            )
+            self.layers = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(sizes))
             self.straight = nn.Linear(n, d, bias=False)
             nn.init.zeros_(self.straight.weight)
 

@@ -2,7 +2,15 @@
 
 from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
+from unconstrain.policies.network import TorchPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.policies.saving import load_policy
 
-__all__ = ["CompiledPolicy", "LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"]
+__all__ = [
+    "CompiledPolicy",
+    "LocallyLinearPolicy",
+    "ParametricPolicy",
+    "TorchPolicy",
+    "load_compiled",
+    "load_policy",
+]

@@ -15,6 +15,9 @@ from typing import Any
 _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.policies.parametric": ("ParametricPolicy",),
     "unconstrain.policies.locally_linear": ("LocallyLinearPolicy",),
+    "unconstrain.policies.network": ("TorchPolicy",),
+    "unconstrain.networks.inferring": ("Candidate",),
+    "unconstrain.networks.model": ("NetworkModel",),
     "unconstrain.features.full": ("FullFeatures",),
     "unconstrain.features.decoupled": ("DecoupledFeatures",),
     "unconstrain.features.potential": ("PotentialFeatures",),

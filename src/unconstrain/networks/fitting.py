@@ -176,9 +176,10 @@ def _conclude(
         return tuple(each[name].weights for each in members)
 
     counts = (survey.n_samples, survey.n_zero, survey.n_known)
+    speed = float(np.sqrt(survey.scale))
     if task.risk != "adaptive":
         w = together(task.risk)
-        return Solution(w, np.nan, None, None, *counts, regions=survey.regions)
+        return Solution(w, np.nan, None, None, *counts, regions=survey.regions, usual_speed=speed)
     name, likelihoods = choose(members, model.n_actions)
     w = together(name)
     beliefs = [each[name].belief for each in members]
@@ -191,7 +192,7 @@ def _conclude(
     held_out = [each[name].tally for each in members]
     repeated = np.mean([belief.noise.action * each.repeated for each in held_out if each is not None])
     history = tuple(entry for each in members for candidate in each.values() for entry in candidate.history)
-    regression = Solution(together("regression"), np.nan, n_samples=survey.n_samples)
+    regression = Solution(together("regression"), np.nan, n_samples=survey.n_samples, usual_speed=speed)
     states = total.counts.states
     return Solution(
         w,
@@ -204,6 +205,7 @@ def _conclude(
         evidence=total.evidence,
         record=Record(likelihoods, history, float(repeated), regression),
         regions=survey.regions,
+        usual_speed=speed,
     )
 
 

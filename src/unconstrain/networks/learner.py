@@ -17,6 +17,9 @@ Weights = dict[str, NDArray[Any]]
 CUT, MOST_CUTS = 0.3, 3
 """By what the rate is lowered where held-out samples are not explained any better, and how often before the end."""
 
+STEPS, LEAST_BATCH = 25, 32
+"""In an epoch so many steps are taken at least, unless that leaves fewer samples for each."""
+
 NOTICEABLE = 1e-3
 """Share of the loss by which an epoch has to be better to count as progress."""
 
@@ -127,8 +130,9 @@ class Learner:
         torch = load_torch()
         self.network.train()
         order = torch.as_tensor(self.rng.permutation(len(shard)), device=self.options.device)
-        # A last minibatch of a few samples would count as much as a full one.
-        n_batches = max(1, round(len(shard) / self.options.batch_size))
+        # Little data get more steps; and a last minibatch of a few samples would count as much as a full one.
+        size = min(self.options.batch_size, max(LEAST_BATCH, len(shard) // STEPS))
+        n_batches = max(1, round(len(shard) / size))
         for rows in torch.tensor_split(order, n_batches):
             self.optimizer.zero_grad(set_to_none=True)
             loss_of(self.forward(shard, rows), shard, rows).backward()

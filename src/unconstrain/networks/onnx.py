@@ -61,12 +61,12 @@ def export(network: NetworkModel, members: tuple[Mapping[str, Any], ...], path: 
                 output_names=["u"],
                 dynamic_axes={"x": {0: "batch"}, "u": {0: "batch"}},
             )
-        written = ReferenceEvaluator(load_model_from_string(file.getvalue())).run(None, {"x": x.numpy()})[0]
+        written = ReferenceEvaluator(load_model_from_string(file.getvalue())).run(None, {"x": x.numpy()})
     except Exception as error:  # PyTorch and ONNX raise nearly anything for what they cannot write
         reason = str(error).partition("\n")[0]
         raise PolicyError(f"PyTorch cannot write this network as ONNX: {reason:.200}") from None
     said = network.evaluate(X, members)
-    off = float(np.abs(written - said).max())
+    off = float(np.abs(np.asarray(next(iter(written))) - said).max())
     if not off <= AGREEMENT * max(float(np.abs(said).max()), 1e-30):
         raise PolicyError(
             f"the ONNX model that PyTorch wrote is {off:.2g} from predict, so nothing was written"

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterator
 from copy import copy
+from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Self
 
@@ -10,27 +11,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted, check_random_state
 
-from unconstrain.arrays import check_choice, check_number, check_states, check_whole
+from unconstrain.arrays import check_number, check_states, check_whole
 from unconstrain.atomic import as_path
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
-from unconstrain.fitting.accumulator import Solution
-from unconstrain.fitting.in_space import InSpace, find_scale, in_units
+from unconstrain.fitting.in_space import InSpace, in_units
 from unconstrain.networks.fitting import Task, fit_networks, make_model
 from unconstrain.networks.learner import Options
 from unconstrain.networks.model import NetworkModel
 from unconstrain.networks.survey import Data
-from unconstrain.policies.base import Policy, _check_in_space
+from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import check_input
+from unconstrain.policies.setting import settle
 from unconstrain.progress import Report
 from unconstrain.samples import Samples
-from unconstrain.spaces import Numbers, Space
+from unconstrain.spaces import Space
 from unconstrain.torch.backend import load_torch
 
 if TYPE_CHECKING:
+    from unconstrain.fitting.accumulator import Solution
     from unconstrain.recordings import Recordings
 
-RISKS = ("adaptive", "inconsistency", "direct")
 SEEDS = 2**31 - 1
 
 
@@ -61,7 +62,7 @@ class TorchPolicy(Policy):
         Passes over the data in each run at most, and passes without progress on held-out episodes after which the
         learning rate is lowered; with the fourth time the run ends.
     batch_size : int
-        Samples in a step of Adam.
+        Samples in a step of Adam; fewer, but 32 at least, where there would be less than 25 steps in a pass.
     learning_rate, weight_decay : float
         Of Adam.
     device : "auto" or anything that `torch.device` takes
@@ -179,78 +180,46 @@ class TorchPolicy(Policy):
         from unconstrain.recordings import Recordings
 
         load_torch()
-        fresh = self._without_stability()
-        fresh.check_options()
         if checkpoint is not None and not isinstance(self.random_state, int | np.integer):
             raise PolicyError(
-                "a checkpoint needs a random_state that is a number, to go on as if nothing had been"
+                "a checkpoint needs a random_state that is a number, to go on as if nothing had happened"
             )
+        fresh = self._without_stability()
         if isinstance(X, Recordings):
             if any(each is not None for each in (y, groups, sample_weight, projections)):
                 raise DataError("recordings bring all there is to learn from: give them alone")
-            read, scalars, given, name = self._read_blocks(fresh, X)
-            in_memory = False
+            read, fresh.actions_are_scalars_ = _open_blocks(fresh, X)
+            first = next(iter(X.blocks()))
+            given: tuple[Any, Any] = first.space, first.noise
+            name, in_memory = X.identity(), False
         else:
-            samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-            given = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
-            read, in_memory, name = (lambda: iter([samples])), True, _digest(samples)
-        fresh.model_, fresh.solution_, fresh.rms_action_ = self._learn(
-            read, in_memory, *given, checkpoint, name, progress
-        )
-        fresh.actions_are_scalars_ = scalars
-        for key, value in vars(fresh).items():
-            setattr(self, key, value)
-        if not hasattr(fresh, "feature_names_in_") and hasattr(self, "feature_names_in_"):
-            del self.feature_names_in_
-        return self
-
-    def predict(self, X: ArrayLike, return_std: bool = False, return_cov: bool = False) -> Any:
-        """Predict actions of the unconstrained policy.
-
-        Parameters
-        ----------
-        X : array_like of shape (N, n)
-            States.
-        return_std : bool
-            Return also how far the networks of an ensemble are from each other, as standard deviations of the actions'
-            shape. That is what they leave open; a bias that all of them share does not show.
-        return_cov : bool
-            Return also the covariances of all actions. Not both.
-
-        Returns
-        -------
-        U : ndarray of shape (N, d)
-            Or (N,), where the policy was fitted to actions of that shape.
-        spread : ndarray of shape (N, d) or (N, d, d)
-            Where asked for.
-
-        Raises
-        ------
-        DataError
-            The states are not finite or not of the dimension learnt.
-        PolicyError
-            Both spreads are asked for, or there is a single network.
-        """
-        actions = super().predict(X)
-        if not (return_std or return_cov):
-            return actions
-        if return_std and return_cov:
-            raise PolicyError(
-                "ask for return_std or return_cov, not both: the deviations are the roots of the covariance's diagonal"
+            samples, fresh.actions_are_scalars_ = check_input(
+                fresh, X, y, groups, sample_weight, projections, first=True
             )
-        covariance = self.covariance(X)
-        spread = covariance if return_cov else np.sqrt(np.einsum("njj->nj", covariance))
-        return actions, spread.reshape(len(spread)) if self.actions_are_scalars_ else spread
+            given = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
+            read, name, in_memory = (
+                partial(iter, [samples]),
+                "" if checkpoint is None else _digest(samples),
+                True,
+            )
+        found = self._fit_networks(read, in_memory, *given, name, checkpoint, progress)
+        fresh.model_, fresh.solution_ = found
+        return self._become(fresh)
 
-    def covariance(self, X: ArrayLike, posterior: None = None) -> np.ndarray:
-        """Compute the covariance of the networks of an ensemble.
+    def learn(self, samples: Samples, space: Space | None, noise: float | None) -> None:
+        """Set what is learnt, on a fresh copy that `fit` then becomes; see `Policy.learn`."""
+        read = partial(iter, [samples])
+        self.model_, self.solution_ = self._fit_networks(read, True, space, noise, "", None, None)
+
+    def covariance(self, X: ArrayLike) -> np.ndarray:
+        """Compute the covariance of the networks of an ensemble: what they leave open.
+
+        A bias that all of them share does not show in it.
 
         Parameters
         ----------
         X : array_like of shape (N, n)
             States.
-        posterior : None
-            Networks have none.
 
         Returns
         -------
@@ -270,11 +239,6 @@ class TorchPolicy(Policy):
         each = self._network.evaluate_each(self.model_.lay_out(X), w) * self.scale_
         off = each - each.mean(axis=0)
         return np.einsum("enj,enk->njk", off, off) / (len(w) - 1)
-
-    def usual_speed(self) -> float:
-        """Compute the root mean square length of the actions learnt from; see `Policy.usual_speed`."""
-        check_is_fitted(self)
-        return float(self.rms_action_)
 
     def save(self, path: str | PathLike[str], *, resumable: bool = False) -> None:
         """Write the policy to a file that `load_policy` reads. Nothing in it is code.
@@ -328,13 +292,11 @@ class TorchPolicy(Policy):
 
     def check_options(self) -> None:
         """Raise `PolicyError` for an option that is impossible."""
-        check_choice(self.risk, "risk", RISKS)
+        super().check_options()
         for name in ("n_ensemble", "max_epochs", "patience", "batch_size"):
             check_whole(getattr(self, name), name, least=1)
         check_number(self.learning_rate, "learning_rate", positive=True)
         check_number(self.weight_decay, "weight_decay", positive=False)
-        if self.noise is not None:
-            check_number(self.noise, "noise", positive=False)
         try:
             sizes = [check_whole(size, "each of hidden", least=1) for size in self.hidden]
         except TypeError:
@@ -345,11 +307,6 @@ class TorchPolicy(Policy):
             )
 
     @property
-    def alpha(self) -> str:
-        """How samples were held out: networks are stopped, and compared, by a fold of the episodes."""
-        return "cv"
-
-    @property
     def _members(self) -> Any:
         return self.solution_.w
 
@@ -357,62 +314,25 @@ class TorchPolicy(Policy):
     def _network(self) -> NetworkModel:
         return self.model_.model if isinstance(self.model_, InSpace) else self.model_  # type: ignore[return-value]
 
-    def _read_blocks(
-        self, fresh: "TorchPolicy", recordings: "Recordings"
-    ) -> tuple[Callable[[], Iterator[Samples]], bool, tuple[Any, Any], str]:
-        """Prepare reading recordings again and again; the first block says what they are."""
-        first = next(iter(recordings.blocks()))
-        _, scalars = self._check_block(fresh, first, first_of_all=True)
-
-        def read() -> Iterator[Samples]:
-            for block in recordings.blocks():
-                yield self._check_block(fresh, block, first_of_all=False)[0]
-
-        return read, scalars, (first.space, first.noise), recordings.identity()
-
-    def _check_block(
-        self, fresh: "TorchPolicy", block: Demonstrations, *, first_of_all: bool
-    ) -> tuple[Samples, bool]:
-        known = None if self.risk == "direct" else block.projections
-        target = fresh if first_of_all else copy(fresh)
-        target.__dict__.setdefault("n_features_in_", block.states.shape[1])
-        return check_input(
-            target, block.states, block.actions, block.episodes, None, known, first=first_of_all
-        )
-
-    def _learn(
+    def _fit_networks(
         self,
         read: Callable[[], Iterator[Samples]],
         in_memory: bool,
         space: Space | None,
         noise: float | None,
-        checkpoint: str | PathLike[str] | None,
         name: str,
+        checkpoint: str | PathLike[str] | None,
         progress: bool | Report | None,
-    ) -> tuple[Any, Solution, float]:
+    ) -> "tuple[Any, Solution]":
+        """Find the setting in the first block, and fit networks to all of them."""
         first = next(read())
-        X, d = first.states, first.actions.shape[1]
-        space = self.space or space or Numbers(X.shape[1])
-        _check_in_space(space, X)
-        scale = find_scale(self.scale, space, X, d)
-        base = None if space.is_flat else space.find_base(X)
-        sure = noise if noise is None or scale is None else noise / float(scale.max())
-        known = float((sure if self.noise is None else self.noise) or 0.0) ** 2
-
-        def lay_out(states: np.ndarray) -> np.ndarray:
-            return states if space.is_flat else space.embed(states, base)
-
-        def in_scale() -> Iterator[Samples]:
-            return (in_units(scale, samples) for samples in read())
-
-        data = Data(in_scale, in_memory)
-        survey = data.look(lay_out)
-        network = make_model(
-            survey, d, tuple(int(size) for size in self.hidden), self.module, self.standardize
-        )
-        model: Any = network
-        if not (space.is_flat and scale is None):
-            model = InSpace(network, space, base, scale)  # type: ignore[arg-type]
+        setting = settle(self, first, space, noise)
+        data = Data(lambda: (in_units(setting.scale, samples) for samples in read()), in_memory)
+        space = setting.space
+        survey = data.look(lambda X: X if space.is_flat else space.embed(X, setting.base))
+        hidden = tuple(int(size) for size in self.hidden)
+        network = make_model(survey, first.actions.shape[1], hidden, self.module, self.standardize)
+        model = setting.wrap(network)
         options = Options(
             float(self.learning_rate),
             float(self.weight_decay),
@@ -422,10 +342,9 @@ class TorchPolicy(Policy):
             find_device(self.device),
         )
         seed = int(check_random_state(self.random_state).randint(SEEDS))
-        task = Task(self.risk, int(self.n_ensemble), options, seed, known)
+        task = Task(self.risk, int(self.n_ensemble), options, seed, setting.noise**2)
         belongs_to = {"data": name, "options": self._settings()}
-        solution = fit_networks(network, model, data, survey, task, checkpoint, belongs_to, progress)
-        return model, solution, float(np.sqrt(survey.scale))
+        return model, fit_networks(network, model, data, survey, task, checkpoint, belongs_to, progress)
 
     def _settings(self) -> str:
         """Describe the options that the result depends on."""
@@ -472,6 +391,23 @@ def find_device(wanted: Any) -> Any:
             f'device must be "auto" or one that PyTorch has, got {wanted!r:.40}: {reason:.120}'
         ) from None
     return device
+
+
+def _open_blocks(
+    policy: TorchPolicy, recordings: "Recordings"
+) -> tuple[Callable[[], Iterator[Samples]], bool]:
+    """Prepare reading recordings again and again, and tell whether actions are single numbers; the policy is told n."""
+
+    def check(block: Demonstrations, *, first: bool) -> tuple[Samples, bool]:
+        known = None if policy.risk == "direct" else block.projections
+        # Blocks after the first have to fit it, but the policy has not learnt anything yet to compare them with.
+        target = policy if first else copy(policy)
+        return check_input(target, block.states, block.actions, block.episodes, None, known, first=True)
+
+    def read() -> Iterator[Samples]:
+        return (check(block, first=False)[0] for block in recordings.blocks())
+
+    return read, check(next(iter(recordings.blocks())), first=True)[1]
 
 
 def _digest(samples: Samples) -> str:

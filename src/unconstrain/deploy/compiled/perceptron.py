@@ -151,17 +151,17 @@ class Perceptron(CompiledPolicy):
         sizes = [int(size) for size in arrays["sizes"]]
         weights, E = arrays["weights"], len(arrays["weights"])
         layers, start = [], 0
-        for a, b in pairwise(sizes):
-            W = weights[:, start : start + a * b].reshape(E, b, a)
-            start += a * b
-            layers.append((W, weights[:, start : start + b]))
-            start += b
+        for n, m in pairwise(sizes):
+            slopes = weights[:, start : start + n * m].reshape(E, m, n)
+            start += n * m
+            layers.append((slopes, weights[:, start : start + m]))
+            start += m
         straight = weights[:, start:].reshape(E, sizes[-1], sizes[0]).mean(axis=0)
         *inner, (W, b) = layers
         outer = np.ascontiguousarray(W.swapaxes(0, 1).reshape(sizes[-1], -1)) / E
         return arrays["center"], arrays["spread"], inner, outer, b.mean(axis=0), straight, sizes
 
-    def _buffers(self) -> tuple[Any, ...]:  # type: ignore[override]
+    def _buffers(self) -> tuple[Any, ...]:
         sizes, E = self._parts[-1], len(self.arrays["weights"])
         return np.empty(sizes[0]), *((np.empty((E, size)), np.empty((E, size))) for size in sizes[1:-1])
 

@@ -20,7 +20,7 @@ test: $(VENV)/.test
 # TORCH='torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu'.
 TORCH ?= torch==2.13.0
 test-torch: $(VENV)/.torch
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest tests/torch
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest tests/torch tests/policies/test_torch_policy.py
 
 # Any number of inputs that nobody meant to give; those that fail are kept in out/fuzz.
 N ?= 1000

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from unconstrain.fitting.noise import Noise
 from unconstrain.networks.checkpoint import Checkpoint
 from unconstrain.networks.inferring import Candidate, Member, choose
 from unconstrain.networks.learner import Learner, Options
+from unconstrain.networks.linear import Linear, fit_linear
 from unconstrain.networks.model import NetworkModel
 from unconstrain.networks.shards import Shard, Shards
 from unconstrain.networks.survey import Data, Survey
@@ -127,6 +129,9 @@ def fit_networks(
     if len(present) < 2:
         raise DataError("networks need at least two samples, to hold one out: give more")
     kept = Checkpoint.open(checkpoint, belongs_to or {}, task.n_members)
+    linear = None
+    if network.module is None:  # of which linear policies are a part
+        linear = cache(partial(fit_linear, network, model, data, task.noise))
     epochs = 0
     with reporting(progress, "epochs") as report:
 
@@ -139,7 +144,7 @@ def fit_networks(
         for number in range(task.n_members):
             of = f"network {number + 1} of {task.n_members}, " if task.n_members > 1 else ""
             fold = present[number % len(present)]
-            member = _member(network, model, data, survey, task, number, fold, tick)
+            member = _member(network, model, data, survey, task, number, fold, linear, tick)
             member.done, member.keep = kept.members[number], kept.write
             members.append(member.learn(lambda text, of=of: begin(report, of + text)))  # type: ignore[misc]
     return _conclude(model, data, survey, task, members)
@@ -153,6 +158,7 @@ def _member(
     task: Task,
     number: int,
     fold: int,
+    linear: Callable[[], Linear] | None,
     tick: Callable[[], None],
 ) -> Member:
     def prepare(samples: Samples) -> Shard:
@@ -166,7 +172,7 @@ def _member(
             shards.append(Shards(lambda: data.without(fold), data.held_out(fold), prepare, data.in_memory))
         return Learner(network, shards[0], task.options, task.seed + RUNS * number + run, tick)
 
-    return Member(model, begin_run, task.risk, survey.scale, task.noise)
+    return Member(model, begin_run, task.risk, survey.scale, task.noise, linear)
 
 
 def _conclude(

@@ -5,6 +5,8 @@
         pass:   infer γ, chain and drift from the samples by the network as it is       (`fitting.contact`)
         descend a few epochs on  -γ log p(u | free) - (1 - γ) log p(ρ | constrained)    (`torch.adaptive`)
         noise:  from the residuals of held-out samples, lowered slowly
+    the linear policy, which far less data determine, learnt from all samples     (`linear`)
+    from where the likeliest of these ended, the noise raised once more: the same again, for longer
     keep:   the simplest of "all free" and the ends whose held-out likelihood none clearly beats
 
 As for models that are linear in their parameters (`fitting.inference`), the noise is lowered from what it seems to be
@@ -45,6 +47,8 @@ from unconstrain.networks.learner import (
     published_loss,
     whole_loss,
 )
+from unconstrain.networks.linear import Linear
+from unconstrain.networks.perceptron import set_linear
 from unconstrain.networks.shards import Shard
 from unconstrain.torch import adaptive_loss
 
@@ -53,6 +57,10 @@ EPOCHS = 2
 
 MOST_COOLING = 60
 """Passes during which noise is lowered, at most."""
+
+LINEAR = "inferred, linear"
+NAMES = (FREE, LINEAR, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN)
+"""Runs whose likelihoods are compared."""
 
 RESTART = 0.3
 """Share of the learning rate with which a run goes on from where another ended."""
@@ -102,6 +110,8 @@ class Member:
         Mean squared length of the actions.
     least : float
         Variance of the noise that is known beforehand.
+    linear : callable, optional
+        Fits the linear policy, where the network has a linear term.
     keep : callable
         Called whenever a run has ended.
     done : dict of str to Candidate
@@ -113,6 +123,7 @@ class Member:
     risk: str
     scale: float
     least: float
+    linear: Callable[[], Linear] | None = None
     keep: Callable[[], None] = lambda: None
     done: dict[str, Candidate] = field(default_factory=dict)
 
@@ -141,19 +152,21 @@ class Member:
         d = self.model.n_actions
         whole, quarter = self.done[FREE].belief, 0.25 * self.scale / d
         assert whole is not None
-        for number, name, weights, variance in (
+        starts = [
             (3, FROM_DIRECT, self.done[FREE].weights, whole.noise.action),
             (4, FROM_INCONSISTENCY, self.done["inconsistency"].weights, quarter),
-        ):
+        ]
+        for number, name, weights, variance in starts:
             start = believe(weights, max(variance, self._floor), drift=Drift() if d > 1 else None)
             self._run(name, number, tell, partial(self._infer, name=name, belief=start))
-        one, other = self.done[FROM_DIRECT], self.done[FROM_INCONSISTENCY]
-        if abs(_likelihood(one) - _likelihood(other)) > NOTICEABLE:
-            end = max(one, other, key=_likelihood).belief
-            assert end is not None
-            warmer = Noise(min(WARMTH * end.noise.action, quarter))
-            start = replace(end, noise=warmer, chain=Chain())
-            self._run(AGAIN, 5, tell, partial(self._infer, name=AGAIN, belief=start))
+        if self.linear is not None:
+            self._run(LINEAR, 6, tell, self._take_linear)
+        ends = [self.done[name] for name in (FROM_DIRECT, FROM_INCONSISTENCY, LINEAR) if name in self.done]
+        end = max(ends, key=_likelihood).belief
+        assert end is not None
+        warmer = Noise(min(WARMTH * end.noise.action, quarter))
+        start = replace(end, noise=warmer, chain=Chain())
+        self._run(AGAIN, 5, tell, partial(self._infer, name=AGAIN, belief=start, is_last=True))
         return self.done
 
     @property
@@ -181,8 +194,28 @@ class Member:
             )
         return Candidate(FREE, weights, belief, self._ask(learner.shards.held_out, belief).tally)
 
-    def _infer(self, learner: Learner, name: str, belief: Belief) -> Candidate:
-        """Alternate inference and descent: first while noise is lowered, then until held-out samples say stop."""
+    def _take_linear(self, learner: Learner) -> Candidate:
+        """Make the network the linear policy, of which it is known how likely samples are that are held out."""
+        assert self.linear is not None
+        linear = self.linear()
+        weights = set_linear(learner.weights, linear.slopes, linear.intercept)
+        noise = Noise(linear.belief.noise.action)
+        belief = replace(linear.belief, w=wrap(weights), noise=noise, is_cooling=False, residual=None)
+        tally = self._ask(learner.shards.held_out, belief).tally
+        tally = replace(tally, log_likelihood=linear.log_likelihood * tally.n_samples)
+        return Candidate(LINEAR, weights, belief, tally)
+
+    def _infer(
+        self,
+        learner: Learner,
+        name: str,
+        belief: Belief,
+        is_last: bool = False,
+    ) -> Candidate:
+        """Alternate inference and descent: first while noise is lowered, then until held-out samples say stop.
+
+        Of runs that are not the last one it is only to be seen where they lead.
+        """
         learner.load(belief.w[0])
         learner.restart(RESTART * learner.options.learning_rate)
         history: list[dict[str, Any]] = []
@@ -191,7 +224,8 @@ class Member:
             history.append(_describe(name, belief, found))
             if not belief.is_cooling:
                 break
-        stop = Stopping(learner)
+        patience = learner.options.patience
+        stop = Stopping(learner, patience) if is_last else Stopping(learner, max(1, patience // EPOCHS), 1)
         for _ in range(learner.options.max_epochs // EPOCHS):
             belief, _ = self._pass(learner, belief, cooling=False)
             tally = self._ask(learner.shards.held_out, belief).tally
@@ -277,11 +311,7 @@ def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str
     log_likelihoods : dict of str to float
         Of a held-out sample by run, the one chosen first.
     """
-    names = [
-        name
-        for name in (FREE, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN)
-        if all(name in each for each in members)
-    ]
+    names = [name for name in NAMES if all(name in each for each in members)]
     tallies = {name: _total([each[name].tally for each in members]) for name in names}
     likelihoods = {name: tally.log_likelihood / tally.n_samples for name, tally in tallies.items()}
 

@@ -108,8 +108,10 @@ class Learner:
         """
         torch = load_torch()
         parameters = [each for each in self.network.parameters() if each.requires_grad]
-        self.rate = rate
-        self.optimizer = torch.optim.AdamW(parameters, lr=rate, weight_decay=self.options.weight_decay)
+        self.rate, fused = rate, self.options.device.type in ("cpu", "cuda")
+        self.optimizer = torch.optim.AdamW(
+            parameters, lr=rate, weight_decay=self.options.weight_decay, fused=fused
+        )
 
     def cut(self) -> None:
         """Lower the learning rate."""
@@ -190,7 +192,7 @@ class Learner:
         dict of str to ndarray
             The parameters that explained them best, which the network has now.
         """
-        stop = Stopping(self)
+        stop = Stopping(self, self.options.patience)
         for _ in range(self.options.max_epochs):
             for shard in self.shards:
                 self.epoch(shard, loss_of)
@@ -209,10 +211,13 @@ class Stopping:
     ----------
     learner : Learner
         Whose.
+    patience, most_cuts : int
+        Looks without progress after which the rate is lowered, and how often it is before the end.
     """
 
-    def __init__(self, learner: Learner) -> None:
+    def __init__(self, learner: Learner, patience: int, most_cuts: int = MOST_CUTS) -> None:
         self.learner, self.best = learner, learner.weights
+        self.patience, self.most_cuts = patience, most_cuts
         self.least, self.mark = np.inf, np.inf
         self.without_progress, self.cuts = 0, 0
         self.kept: Any = None
@@ -233,7 +238,7 @@ class Stopping:
             self.mark, self.without_progress = loss, 0
             return
         self.without_progress += 1
-        if self.without_progress >= self.learner.options.patience:
+        if self.without_progress >= self.patience:
             self.cuts, self.without_progress = self.cuts + 1, 0
             self.learner.load(self.best)
             self.learner.cut()
@@ -241,7 +246,7 @@ class Stopping:
     @property
     def is_done(self) -> bool:
         """Whether the rate was lowered often enough."""
-        return self.cuts > MOST_CUTS
+        return self.cuts > self.most_cuts
 
 
 def whole_loss(P: Any, shard: Shard, rows: Any) -> Any:

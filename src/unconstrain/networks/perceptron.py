@@ -59,6 +59,29 @@ def evaluate(w: Mapping[str, NDArray[Any]], Z: Floats) -> Floats:
     return straight + h @ w[f"layers.{last}.weight"].T.astype(np.float64) + w[f"layers.{last}.bias"]
 
 
+def set_linear(w: Mapping[str, NDArray[Any]], slopes: Floats, intercept: Floats) -> dict[str, NDArray[Any]]:
+    """Make the network a linear policy, `slopes @ z + intercept`, in which no hidden unit has a say.
+
+    Parameters
+    ----------
+    w : mapping of str to ndarray
+        Parameters.
+    slopes : ndarray of shape (d, n)
+        Of standardised states.
+    intercept : ndarray of shape (d,)
+        Where these are zero.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Parameters, the hidden units' own as they were.
+    """
+    last = count_layers(w) - 1
+    weight, bias = f"layers.{last}.weight", f"layers.{last}.bias"
+    new = {weight: np.zeros_like(w[weight]), bias: intercept, "straight.weight": slopes}
+    return {name: np.asarray(new.get(name, value), dtype=value.dtype) for name, value in w.items()}
+
+
 def count_layers(w: Mapping[str, NDArray[Any]]) -> int:
     """Count the layers that parameters belong to.
 

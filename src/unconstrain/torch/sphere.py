@@ -93,11 +93,12 @@ def evaluate(d: int, kappa: "Tensor") -> "tuple[Tensor, Tensor]":
     top = nu + steps
     value = _debye(top, near)
     q = torch.exp(_debye(top + 1, near) - value)
-    quarter = near**2 / 4
+    quarter, one, product = near**2 / 4, torch.ones_like(near), torch.ones_like(near)
     for step in range(steps):
         j = top - step
-        q = 1 / (1 + quarter * q / (j * (j + 1)))
-        value = value - torch.log(q)
+        q = torch.addcmul(one, quarter, q, value=1 / (j * (j + 1))).reciprocal()
+        product = product * q
+    value = value - torch.log(product)
     short = 1 - near / (2 * (nu + 1)) * q
     value = value - near
     distant = kappa.clamp(min=far)
@@ -113,9 +114,8 @@ def _debye(mu: float, kappa: "Tensor") -> "Tensor":
     torch = load_torch()
     h = torch.sqrt(mu**2 + kappa**2)
     t = mu / h
-    series = torch.zeros_like(t)
-    for coefficient in reversed(_coefficients(mu)):
-        series = series * t + coefficient
+    powers = t[:, None] ** torch.arange(3 * TERMS + 1, dtype=t.dtype, device=t.device)
+    series = powers @ torch.tensor(_coefficients(mu), dtype=t.dtype, device=t.device)
     constant = math.lgamma(mu + 1) + mu * math.log(2.0) - 0.5 * math.log(2 * math.pi)
     return constant - mu * torch.log(mu + h) + h - 0.5 * torch.log(h) + torch.log(series)
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from unconstrain.policies import (
         LocallyLinearPolicy,
         ParametricPolicy,
+        RegressorPolicy,
         TorchPolicy,
         load_compiled,
         load_policy,
@@ -58,6 +59,7 @@ __all__ = [
     "PotentialFeatures",
     "Preparation",
     "Recordings",
+    "RegressorPolicy",
     "TorchPolicy",
     "constraints",
     "distributed",
@@ -97,6 +99,7 @@ _HOMES = {
     "unconstrain.policies": (
         "LocallyLinearPolicy",
         "ParametricPolicy",
+        "RegressorPolicy",
         "TorchPolicy",
         "load_compiled",
         "load_policy",

@@ -4,12 +4,14 @@ from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.network import TorchPolicy
 from unconstrain.policies.parametric import ParametricPolicy
+from unconstrain.policies.regressor import RegressorPolicy
 from unconstrain.policies.saving import load_policy
 
 __all__ = [
     "CompiledPolicy",
     "LocallyLinearPolicy",
     "ParametricPolicy",
+    "RegressorPolicy",
     "TorchPolicy",
     "load_compiled",
     "load_policy",

@@ -324,6 +324,9 @@ def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str
 
     best = max(names, key=lambda name: gain(name, FREE))
     best = best if gain(best, FREE) > 0 else FREE
+    for name in names:
+        # What a gain counts hangs on the evidence of the run that gains.
+        best = name if gain(name, FREE) > 0 and gain(name, best) > 0 else best
     return best, dict(sorted(likelihoods.items(), key=lambda item: item[0] != best))
 
 

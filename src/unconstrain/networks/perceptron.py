@@ -74,12 +74,13 @@ def set_linear(w: Mapping[str, NDArray[Any]], slopes: Floats, intercept: Floats)
     Returns
     -------
     dict of str to ndarray
-        Parameters, the hidden units' own as they were.
+        Parameters, the hidden units' own as they were. Those of the linear policy keep double precision, in which the
+        network is evaluated, though not descended.
     """
     last = count_layers(w) - 1
     weight, bias = f"layers.{last}.weight", f"layers.{last}.bias"
     new = {weight: np.zeros_like(w[weight]), bias: intercept, "straight.weight": slopes}
-    return {name: np.asarray(new.get(name, value), dtype=value.dtype) for name, value in w.items()}
+    return {name: new.get(name, value) for name, value in w.items()}
 
 
 def count_layers(w: Mapping[str, NDArray[Any]]) -> int:

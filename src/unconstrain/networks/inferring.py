@@ -112,7 +112,7 @@ class Member:
         Variance of the noise that is known beforehand.
     linear : callable, optional
         Fits the linear policy, where the network has a linear term.
-    keep : callable
+    keep : callable, optional
         Called whenever a run has ended.
     done : dict of str to Candidate
         Runs that have ended.
@@ -124,7 +124,7 @@ class Member:
     scale: float
     least: float
     linear: Callable[[], Linear] | None = None
-    keep: Callable[[], None] = lambda: None
+    keep: Callable[[], None] | None = None
     done: dict[str, Candidate] = field(default_factory=dict)
 
     def learn(self, tell: Callable[[str], None]) -> dict[str, Candidate]:
@@ -179,7 +179,8 @@ class Member:
         if name not in self.done:
             tell(name)
             self.done[name] = run(self.begin(number))
-            self.keep()
+            if self.keep is not None:
+                self.keep()
 
     def _fit_free(self, learner: Learner) -> Candidate:
         """Learn from all samples as free ones, and find the noise that held-out ones then have."""

@@ -78,7 +78,7 @@ class TorchPolicy(Policy):
         How many samples were learnt from, how many of them have no direction, and of how many the projection was known.
     noise_, free_share_, log_likelihood_, log_likelihoods_, history_
         With the adaptive risk, as for `ParametricPolicy`; the likelihoods are those of samples held out, by which the
-        descent was stopped too.
+        descent was stopped too. The noise is that of held-out samples, so it contains what the network misses.
 
     Notes
     -----

@@ -1,6 +1,7 @@
 """Networks as estimators: what they learn, how they go on, and what else may be asked of them."""
 
 import warnings
+from functools import partialmethod
 
 import numpy as np
 import pytest
@@ -169,7 +170,7 @@ def test_a_fit_that_was_interrupted_ends_the_same(tmp_path):
         uc.TorchPolicy().fit(X, U, checkpoint=path)
 
 
-def test_recordings_are_read_block_by_block(tmp_path):
+def test_recordings_are_read_block_by_block(tmp_path, monkeypatch):
     demos = toy.demonstrate(10, free=0.5, random_state=0)
     table = np.column_stack([demos.episodes, demos.states, demos.actions])
     np.savetxt(tmp_path / "all.csv", table, delimiter=",", header="episode,x,y,u,v", comments="")
@@ -178,6 +179,13 @@ def test_recordings_are_read_block_by_block(tmp_path):
     policy = uc.TorchPolicy(**QUICK).fit(opened)
     assert policy.n_samples_seen_ == len(demos.states)
     memory = uc.TorchPolicy(**QUICK).fit(opened.load())
+    with monkeypatch.context() as patched:
+        patched.setattr(Recordings, "blocks", partialmethod(Recordings.blocks, 100))
+        pieces = uc.TorchPolicy(**QUICK).fit(opened)
+    assert pieces.n_samples_seen_ == len(demos.states)
+    np.testing.assert_allclose(pieces.model_.center, policy.model_.center)
+    np.testing.assert_allclose(pieces.model_.unit, policy.model_.unit)
+    assert error(demos.policy, pieces.predict(demos.states)) < 1
     # Passes of a stream descend once, those of samples in memory twice; the regression is the same.
     one, other = policy.ordinary_regression(), memory.ordinary_regression()
     np.testing.assert_allclose(one.predict(demos.states), other.predict(demos.states), atol=1e-5)

@@ -15,14 +15,18 @@ LEROBOT = Path(__file__).parents[3] / "shared" / "data" / "lerobot"
 
 def run(folder, *arguments):
     code = [sys.executable, *map(str, arguments)]
-    done = subprocess.run(code, cwd=folder, capture_output=True, text=True, env=os.environ | {"MPLBACKEND": "agg"})
+    done = subprocess.run(
+        code, cwd=folder, capture_output=True, text=True, env=os.environ | {"MPLBACKEND": "agg"}
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_two_lines_in_a_policy_of_lerobots_kind(tmp_path):
     printed = run(tmp_path, EXAMPLES / "lerobot_loss.py")
-    missed = dict(line.split(" of the true")[0].split(": ") for line in printed.splitlines() if "missed" in line)
+    missed = dict(
+        line.split(" of the true")[0].split(": ") for line in printed.splitlines() if "missed" in line
+    )
     assert float(missed["our loss"]) < 0.2 * float(missed["regression"])
     assert (tmp_path / "lerobot_loss.png").stat().st_size > 10_000
 

@@ -13,7 +13,7 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces
+    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces, torch
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         LocallyLinearPolicy,
         ParametricPolicy,
         RegressorPolicy,
+        TorchPolicy,
         load_compiled,
         load_policy,
     )
@@ -59,6 +60,7 @@ __all__ = [
     "Preparation",
     "Recordings",
     "RegressorPolicy",
+    "TorchPolicy",
     "constraints",
     "distributed",
     "errors",
@@ -78,6 +80,7 @@ __all__ = [
     "robots",
     "select_policy",
     "spaces",
+    "torch",
 ]
 
 _HOMES = {
@@ -97,6 +100,7 @@ _HOMES = {
         "LocallyLinearPolicy",
         "ParametricPolicy",
         "RegressorPolicy",
+        "TorchPolicy",
         "load_compiled",
         "load_policy",
     ),
@@ -124,6 +128,7 @@ _NAMESPACES = {
     "plot": "unconstrain.plot",
     "robots": "unconstrain.robots",
     "spaces": "unconstrain.spaces",
+    "torch": "unconstrain.torch",
 }
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours

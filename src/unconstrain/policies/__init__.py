@@ -2,6 +2,7 @@
 
 from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
+from unconstrain.policies.network import TorchPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.policies.regressor import RegressorPolicy
 from unconstrain.policies.saving import load_policy
@@ -11,6 +12,7 @@ __all__ = [
     "LocallyLinearPolicy",
     "ParametricPolicy",
     "RegressorPolicy",
+    "TorchPolicy",
     "load_compiled",
     "load_policy",
 ]

@@ -19,6 +19,7 @@ from unconstrain.fitting.contact import Belief, Tally, judge
 from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.halves import Halves
 from unconstrain.fitting.inference import (
+    AGAIN,
     DECISIVE,
     FREE,
     FROM_DIRECT,
@@ -27,6 +28,7 @@ from unconstrain.fitting.inference import (
     NOTICEABLE,
     SPEED,
     SPEED_AT_FIRST,
+    WARMTH,
 )
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import observe, unknown
@@ -43,6 +45,9 @@ FROM_LINEAR = "inferred, from the linear policy"
 
 FIRST_ROUNDS = 4
 """Rounds from each start, after which the likelier goes on alone; fewer where fits are."""
+
+WARM_ROUNDS = 8
+"""Rounds that go on from the end of these with more noise."""
 
 FITS_A_ROUND, STARTS = 2, 3
 
@@ -154,9 +159,12 @@ class Completing:
         )
         for rounds in (from_linear, from_direct):
             self._go_on(rounds, self._first_rounds)
-        best = max(from_linear, from_direct, key=lambda rounds: rounds.score)
+        first = max(from_linear, from_direct, key=lambda rounds: rounds.score)
+        again = self._warm(first)
+        self._go_on(again, WARM_ROUNDS)
+        best = max(first, again, key=lambda rounds: rounds.score)
         self._go_on(best)
-        likelihoods = {rounds.name: rounds.score for rounds in (from_linear, from_direct, free)}
+        likelihoods = {rounds.name: rounds.score for rounds in (from_linear, from_direct, again, free)}
         best = best if self._beats(best, free) else free
         faster = None if best is free else self._vary_speed(best)
         if faster is not None:
@@ -249,6 +257,18 @@ class Completing:
         omega = np.ones(len(U)) if weights is None else weights
         rounds.score = max(rounds.score, find_heavy_tailed(squares, views.ranks, omega, self._least))
         return rounds
+
+    def _warm(self, first: Rounds) -> Rounds:
+        """Go on from the predictions of other rounds, with more noise.
+
+        A free sample that is taken for constrained teaches nothing across its sphere, so that the policy stays wrong
+        there, and the sample far from it. With more noise a policy that is nearly right takes it for free.
+        """
+        assert first.predictions is not None
+        belief = first.rule.settle(first.predictions)
+        noise = replace(belief.noise, action=WARMTH * belief.noise.action)
+        warm = replace(belief, noise=noise, chain=Chain(), is_cooling=True)
+        return self._rounds(AGAIN, self._rule(warm), first.prior, first.predictions)
 
     def _vary_speed(self, best: Rounds) -> Rounds | None:
         """Go on from the end of other rounds with noise in the speed, where that explains clearly more."""

@@ -10,6 +10,7 @@ Half of their stretches are free, the others lose one direction each, drawn anew
 
 import time
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +37,10 @@ KINDS: dict[str, Callable[[], Any]] = {
     "local models": uc.LocallyLinearPolicy,
     "extra trees": lambda: uc.RegressorPolicy(ExtraTreesRegressor(50, min_samples_leaf=3, random_state=0)),
     "boosting": lambda: uc.RegressorPolicy(HistGradientBoostingRegressor(max_iter=50, random_state=0)),
+    "network": lambda: uc.TorchPolicy(random_state=0),
 }
+NEEDS = {"network": "torch"}
+"""Kinds that need a package which may not be installed."""
 
 
 class Data(NamedTuple):
@@ -117,10 +121,14 @@ def measure(kind: str, rows: int, n: int, noise: float) -> Row:
     return Row(kind, len(X), n, noise, nupe(policy, inside), nupe(policy, outside), seconds, *times)
 
 
+def list_kinds() -> list[str]:
+    return [kind for kind in KINDS if kind not in NEEDS or find_spec(NEEDS[kind]) is not None]
+
+
 def measure_all() -> Iterator[Row]:
     took: dict[tuple[str, int], tuple[int, float]] = {}
     for rows, n, noise in track(list(settings()), "models", transient=True):
-        for kind in KINDS:
+        for kind in list_kinds():
             before, seconds = took.get((kind, n), (rows, 0.0))
             if seconds * rows / before > LONGEST:
                 yield Row(kind, rows, n, noise, *[np.nan] * 5)
@@ -132,6 +140,9 @@ def measure_all() -> Iterator[Row]:
 
 def print_tables() -> None:
     """Print errors and times, a row a data set and a column a kind."""
+    kinds = list_kinds()
+    for kind in set(KINDS) - set(kinds):
+        print(f"{kind} is left out: {NEEDS[kind]} is not installed")
     found = {(row.kind, row.rows, row.dimensions, row.noise): row for row in measure_all()}
     for title, write in (
         ("nUPE", lambda row: f"{row.inside:.2g}"),
@@ -141,9 +152,9 @@ def print_tables() -> None:
         ("1,000 states / Ridge.predict", lambda row: f"{row.thousand:.2g}"),
     ):
         print(f"\n{title}:\n")
-        print(f"| rows | dimensions | noise | {' | '.join(KINDS)} |")
-        print("| --- " * (3 + len(KINDS)) + "|")
+        print(f"| rows | dimensions | noise | {' | '.join(kinds)} |")
+        print("| --- " * (3 + len(kinds)) + "|")
         for rows, n, noise in settings():
-            cells = [found[kind, rows, n, noise] for kind in KINDS]
+            cells = [found[kind, rows, n, noise] for kind in kinds]
             written = ["-" if np.isnan(row.fit) else write(row) for row in cells]
             print(f"| {rows:,} | {n} | {noise:.0%} | {' | '.join(written)} |")

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from unconstrain.fitting.contact import Belief, Found, judge
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import Observation, squared_errors
+from unconstrain.fitting.regression import Trend
 from unconstrain.samples import Samples
 
 Floats = NDArray[np.float64]
@@ -162,8 +163,10 @@ class Rounds:
         Where it starts.
     rule : Rule
         By which targets are completed.
+    trend : Trend or None
+        What the regressor learns the rest of; None stands for zero.
     prior : ndarray of shape (N, d)
-        What the regressor learns the rest of.
+        The actions that it says.
     ahead : ndarray of shape (N, d)
         Predictions that the first round begins with.
     predict : callable
@@ -172,6 +175,7 @@ class Rounds:
 
     name: str
     rule: Any
+    trend: Trend | None
     prior: Floats
     ahead: Floats
     predict: Callable[[Floats], Floats]

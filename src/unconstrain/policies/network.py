@@ -93,6 +93,10 @@ class TorchPolicy(Policy):
     >>> actions, spread = policy.predict(X, return_std=True)    # doctest: +SKIP
     """
 
+    with_streams = (
+        "reads a stream itself, again and again, with policy.fit(uc.open(...)), and not by `fit_stream`"
+    )
+
     def __init__(
         self,
         module: Any = None,

@@ -28,7 +28,7 @@ LENGTH, STRETCH, DT = 50, 10, 0.05
 """Samples of a movement and of a stretch under one constraint; seconds between samples."""
 TESTED, OUTSIDE = 2_000, 1.25
 """States tested on; where those of the extrapolation lie, in units of the box that movements start in."""
-LONGEST = 15.0
+LONGEST = 30.0
 """Seconds of a processor, which do not count what others do on the machine."""
 
 KINDS: dict[str, Callable[[], Any]] = {

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.fitting.model import Model
+from unconstrain.fitting.model import LinearModel
 from unconstrain.fitting.observation import Projected, observe
 from unconstrain.fitting.posterior import Posterior
 
@@ -76,12 +76,12 @@ def informative_rows(clean: Demonstrations) -> Array:
     return rows
 
 
-def compute_bounds(model: Model, clean: Demonstrations, test: Demonstrations, noise: float) -> Bounds:
+def compute_bounds(model: LinearModel, clean: Demonstrations, test: Demonstrations, noise: float) -> Bounds:
     """Compute both bounds of the nUPE.
 
     Parameters
     ----------
-    model : Model
+    model : LinearModel
         The features, fitted: `policy.model_`.
     clean : Demonstrations
         What is learnt from, before noise is added, with the true policy and projections.
@@ -107,12 +107,12 @@ def compute_bounds(model: Model, clean: Demonstrations, test: Demonstrations, no
     return Bounds(unknown, told)
 
 
-def find_prior_variance(model: Model, X: Array, Pi: Array, noise: float) -> Array:
+def find_prior_variance(model: LinearModel, X: Array, Pi: Array, noise: float) -> Array:
     """Find the most probable variance of a policy's parameters, that of each of S models by itself.
 
     Parameters
     ----------
-    model : Model
+    model : LinearModel
         Fitted features.
     X : ndarray of shape (N, n)
         States.
@@ -139,14 +139,14 @@ def find_prior_variance(model: Model, X: Array, Pi: Array, noise: float) -> Arra
     return v
 
 
-def _covariance(model: Model, X: Array, rows: Array, noise: float, prior: Array) -> Array:
+def _covariance(model: LinearModel, X: Array, rows: Array, noise: float, prior: Array) -> Array:
     """Compute the least covariance of the parameters, (P, P), or (S, P, P) of S local models."""
     H = model.moments(X, Projected(rows, np.zeros(rows.shape[:2]))).H
     inverse = np.linalg.inv(H + (noise**2 / prior)[..., None, None] * np.eye(H.shape[-1]))
     return noise**2 * (inverse + inverse.swapaxes(-1, -2)) / 2
 
 
-def _error(model: Model, X: Array, covariance: Array) -> float:
+def _error(model: LinearModel, X: Array, covariance: Array) -> float:
     """Compute the mean squared error `tr Φ Σ Φᵀ` that parameters of this covariance make at states X."""
     batch = covariance.shape[:-2]
     about_zero = Posterior(

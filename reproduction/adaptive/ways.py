@@ -13,6 +13,7 @@ from unconstrain.diagnostics import identifiability
 from unconstrain.errors import PolicyError
 from unconstrain.policies import ParametricPolicy
 from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 
 Array = NDArray[np.float64]
 
@@ -45,12 +46,12 @@ def _knows(risk: str) -> bool:
     return True
 
 
-def learn(policy: Policy, way: str, demos: Demonstrations, known: Array | None = None) -> Policy:
+def learn(policy: LinearPolicy, way: str, demos: Demonstrations, known: Array | None = None) -> LinearPolicy:
     """Learn in one of the ways.
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Its model; it is copied, and its risk does not matter.
     way : str
         One of `COLUMNS`.
@@ -61,7 +62,7 @@ def learn(policy: Policy, way: str, demos: Demonstrations, known: Array | None =
 
     Returns
     -------
-    Policy
+    LinearPolicy
         Fitted.
     """
     told = way == TOLD
@@ -99,7 +100,7 @@ def root_mean_square(U: Array) -> float:
 
 
 def compare_ways(
-    policy: Policy,
+    policy: LinearPolicy,
     ways: tuple[str, ...],
     clean: Demonstrations,
     test: Demonstrations,
@@ -110,7 +111,7 @@ def compare_ways(
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         The model of all.
     ways : tuple of str
         Of `COLUMNS`.
@@ -135,7 +136,7 @@ def compare_ways(
 
 
 def compare_recorded(
-    policy: Policy,
+    policy: LinearPolicy,
     ways: tuple[str, ...],
     noisy: Demonstrations,
     clean: Demonstrations,
@@ -147,7 +148,7 @@ def compare_recorded(
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         The model of all.
     ways : tuple of str
         Of `COLUMNS`.

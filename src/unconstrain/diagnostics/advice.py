@@ -39,7 +39,7 @@ from unconstrain.diagnostics.foresight import Foresight, Movements
 from unconstrain.fitting.observation import observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.parallel import cut_blocks
-from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 
 CRITERIA = ("A", "D")
 
@@ -83,7 +83,7 @@ class Planner:
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     posteriors : sequence of Posterior
         Of the recordings made so far, in every reading of them, as likely as each other. The first is that of the
@@ -105,7 +105,7 @@ class Planner:
 
     def __init__(
         self,
-        policy: Policy,
+        policy: LinearPolicy,
         posteriors: Sequence[Posterior],
         candidates: np.ndarray,
         length: float,

@@ -14,7 +14,7 @@ import numpy as np
 from unconstrain.diagnostics.information import Information
 from unconstrain.diagnostics.spectrum import compute_directions, compute_shares
 from unconstrain.parallel import cut_blocks
-from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
 
 NUMBERS_IN_BLOCK = 2**20
@@ -43,13 +43,13 @@ class Contribution:
 
 
 def compute_contributions(
-    policy: Policy, information: Information, samples: Samples, episodes: np.ndarray, threshold: float
+    policy: LinearPolicy, information: Information, samples: Samples, episodes: np.ndarray, threshold: float
 ) -> list[Contribution]:
     """Compute what every episode contributes.
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     information : Information
         Of these samples.
@@ -93,13 +93,13 @@ def compute_contributions(
 
 
 def compute_leverages(
-    policy: Policy, information: Information, samples: Samples, threshold: float
+    policy: LinearPolicy, information: Information, samples: Samples, threshold: float
 ) -> np.ndarray:
     """Compute the leverage `ω tr(V A Vᵀ)` of every sample.
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     information : Information
         Of these samples.

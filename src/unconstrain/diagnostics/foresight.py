@@ -15,7 +15,7 @@ import numpy as np
 from unconstrain.constraints.nullspace import constrain
 from unconstrain.errors import DataError
 from unconstrain.fitting.observation import unknown
-from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
 
 POINTS = 8
@@ -68,7 +68,7 @@ class Foresight:
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     step : float
         Time between samples in the unit that actions are velocities in; zero where recordings stay where they start.
@@ -78,18 +78,18 @@ class Foresight:
         The share of samples whose projection will be known, as it was in the recordings.
     """
 
-    policy: Policy
+    policy: LinearPolicy
     step: float = 0.0
     fastest: float = np.inf
     told: float = 0.0
 
     @classmethod
-    def of(cls, policy: Policy, samples: Samples) -> "Foresight":
+    def of(cls, policy: LinearPolicy, samples: Samples) -> "Foresight":
         """Find from recordings how much time passes between samples.
 
         Parameters
         ----------
-        policy : Policy
+        policy : LinearPolicy
             Fitted.
         samples : Samples
             The recordings, in order.

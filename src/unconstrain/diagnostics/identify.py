@@ -23,13 +23,14 @@ from unconstrain.fitting.observation import informative
 from unconstrain.motion import moving
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
 
 BOTH_OR_NEITHER = "give states and actions both, or neither: identifiability(policy, X, U)"
 
 
 def identifiability(
-    policy: Policy,
+    policy: LinearPolicy,
     X: ArrayLike | Demonstrations | None = None,
     U: ArrayLike | None = None,
     *,
@@ -42,7 +43,7 @@ def identifiability(
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted. Its features, centres and parameters are used, its λ is not.
     X : array_like of shape (N, n), or Demonstrations, optional
         Recorded states, usually those that the policy was fitted to. Demonstrations bring their actions, their episodes
@@ -84,6 +85,11 @@ def identifiability(
     """
     if not isinstance(policy, Policy):
         raise PolicyError(f"identifiability is about a policy of unconstrain, got {type(policy).__name__}")
+    if not isinstance(policy, LinearPolicy):
+        raise PolicyError(
+            "identifiability is about a policy that is linear in its parameters, a ParametricPolicy or a "
+            f"LocallyLinearPolicy, got a {type(policy).__name__}: fit one of these to the same recordings"
+        )
     check_is_fitted(policy)
     threshold = check_number(threshold, "threshold", positive=True)
     if X is None and U is None:
@@ -100,7 +106,7 @@ def identifiability(
 
 
 def check_recordings(
-    policy: Policy,
+    policy: LinearPolicy,
     X: ArrayLike,
     U: ArrayLike,
     groups: ArrayLike | None = None,
@@ -111,7 +117,7 @@ def check_recordings(
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     X : array_like of shape (N, n)
         States.

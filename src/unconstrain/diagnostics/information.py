@@ -19,7 +19,7 @@ import numpy as np
 from unconstrain.errors import PolicyError
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import observe
-from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
 
 
@@ -39,12 +39,12 @@ class Information:
     whole: np.ndarray
 
     @classmethod
-    def from_samples(cls, policy: Policy, samples: Samples) -> "Information":
+    def from_samples(cls, policy: LinearPolicy, samples: Samples) -> "Information":
         """Sum samples up under a fitted policy's features.
 
         Parameters
         ----------
-        policy : Policy
+        policy : LinearPolicy
             Fitted. With the adaptive risk samples show what is inferred of them, else what lies along their motion.
         samples : Samples
             Checked; each has motion or a known projection.
@@ -62,12 +62,12 @@ class Information:
         return cls(moments, whole.reshape(-1, *whole.shape[-2:]))
 
     @classmethod
-    def from_fit(cls, policy: Policy) -> "Information":
+    def from_fit(cls, policy: LinearPolicy) -> "Information":
         """Take the information in all that a policy was fitted to from its moments alone.
 
         Parameters
         ----------
-        policy : Policy
+        policy : LinearPolicy
             Fitted.
 
         Returns

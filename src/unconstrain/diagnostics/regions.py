@@ -8,7 +8,7 @@ from unconstrain.diagnostics.coverage import compute_coverage
 from unconstrain.features.centers import farthest_first
 from unconstrain.features.scaling import Scaling
 from unconstrain.fitting.posterior import Posterior
-from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.receptive import squared_distances
 from unconstrain.samples import Samples
 
@@ -42,13 +42,13 @@ class Region:
 
 
 def find_worst_regions(
-    policy: Policy, posterior: Posterior, samples: Samples, k: int, reach: np.ndarray
+    policy: LinearPolicy, posterior: Posterior, samples: Samples, k: int, reach: np.ndarray
 ) -> list[Region]:
     """Find the recorded states, apart from each other, where the policy is known least.
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     posterior : Posterior
         Of its parameters.

@@ -25,7 +25,7 @@ from unconstrain.fitting.in_space import in_units
 from unconstrain.fitting.observation import observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.motion import directions as unit_directions
-from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
 
 
@@ -34,7 +34,7 @@ class Identifiability:
 
     Parameters
     ----------
-    policy : Policy
+    policy : LinearPolicy
         Fitted.
     information : Information
         In the recordings, under the policy's features.
@@ -48,7 +48,7 @@ class Identifiability:
 
     def __init__(
         self,
-        policy: Policy,
+        policy: LinearPolicy,
         information: Information,
         threshold: float,
         samples: Samples | None = None,

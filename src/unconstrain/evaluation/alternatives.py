@@ -14,6 +14,7 @@ from unconstrain.evaluation.turns import find_turn
 from unconstrain.policies import ParametricPolicy
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inferred import finds_no_contact
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.recordings.derivative import differentiate, longest_window
 from unconstrain.recordings.phase import add_phase
 from unconstrain.recordings.relative import GOAL, START, end_of, moving_centre
@@ -133,9 +134,10 @@ def _list_models(policy: Policy, meaning: str, view: Demonstrations) -> list[tup
     """List the models to be tried: the policy's own, unless that takes long, and the simplest."""
     size = view.actions.shape[1] * (view.states.shape[1] + 1)
     own = clone(policy).set_params(space=None, scale=None, noise=None)
-    simplest = ParametricPolicy(alpha=policy.alpha)
+    simplest = ParametricPolicy(alpha=getattr(policy, "alpha", "cv"))
     is_simplest = isinstance(policy, ParametricPolicy) and policy.features is None
-    models = [] if meaning == LINEAR or size > LARGEST else [(own, "")]
+    is_quick = isinstance(policy, LinearPolicy) and size <= LARGEST
+    models: list[tuple[Policy, str]] = [(own, "")] if is_quick and meaning != LINEAR else []
     if size <= LARGEST_LINEAR and not (is_simplest and (models or meaning == LINEAR)):
         models.append((simplest, "" if is_simplest else "--model linear"))
     return models

@@ -17,7 +17,7 @@ from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
 from unconstrain.fitting.corrected import CorrectedMoments, Part, add_up
 from unconstrain.fitting.correction import Correction
 from unconstrain.fitting.in_space import in_units
-from unconstrain.fitting.model import Model
+from unconstrain.fitting.model import LinearModel
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation, informative, observe, unknown
 from unconstrain.fitting.region import Region
@@ -46,10 +46,10 @@ class Solution:
 
     Parameters
     ----------
-    w : ndarray of shape (P,) or (S, P)
-        Parameters of the model, or of each of S models.
+    w : ndarray of shape (P,) or (S, P), or object
+        Parameters of the model, or of each of S models; of a regression, the fitted regressor.
     alpha : float
-        The weight decay λ, a pure number; see `fitting.decay`.
+        The weight decay λ, a pure number; see `fitting.decay`. NaN where there is none.
     alphas, held_out_risk : ndarray of shape (L,), optional
         The candidates for λ and their held-out risk in squared units of the action, where λ was chosen.
     n_samples, n_zero, n_known : int
@@ -64,6 +64,8 @@ class Solution:
         How that was found.
     regions : tuple of Region or None
         By fold: where the samples lie.
+    usual_speed : float
+        Root mean square length of the actions, where no sums are kept that tell it.
     noise, residual : float
         For "corrected": variance of the noise, and of what one sample shows about the policy (`Correction.residual`),
         in squared units of the action; else NaN.
@@ -71,8 +73,8 @@ class Solution:
         For "corrected": why that may be wrong, in a sentence.
     """
 
-    w: np.ndarray
-    alpha: float
+    w: Any
+    alpha: float = math.nan
     alphas: np.ndarray | None = None
     held_out_risk: np.ndarray | None = None
     n_samples: int = 0
@@ -83,6 +85,7 @@ class Solution:
     evidence: float = 1.0
     record: "Record" = field(default_factory=lambda: Record())
     regions: tuple[Region | None, ...] = ()
+    usual_speed: float = math.nan
     noise: float = math.nan
     residual: float = math.nan
     doubt: str = ""
@@ -116,7 +119,7 @@ class Accumulator:
 
     Parameters
     ----------
-    model : Model
+    model : LinearModel
         What samples are summed under.
     risk : {"adaptive", "corrected", "inconsistency", "direct", "whole"}
         What a sample says of the policy; "whole" is direct where nothing is known of the projection.
@@ -155,7 +158,7 @@ class Accumulator:
 
     def __init__(
         self,
-        model: Model,
+        model: LinearModel,
         risk: str = "inconsistency",
         alpha: float | str = "cv",
         longest: float = 0.0,

@@ -42,7 +42,7 @@ class Belief:
 
     Parameters
     ----------
-    w : ndarray
+    w : object
         Parameters of the model.
     noise : Noise
         Variances by which samples are judged to be free or not.
@@ -60,7 +60,7 @@ class Belief:
         policies too large.
     """
 
-    w: Floats
+    w: Any
     noise: Noise
     chain: Chain = field(default_factory=Chain)
     drift: Drift | None = None
@@ -239,8 +239,27 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
     Found
         Of N samples.
     """
+    return judge(model.evaluate(samples.states, belief.w), belief, samples)
+
+
+def judge(P: Floats, belief: Belief, samples: Samples) -> Found:
+    """Infer which samples were free, by predictions of their actions.
+
+    Parameters
+    ----------
+    P : ndarray of shape (N, d)
+        Predictions.
+    belief : Belief
+        So far; its parameters are not looked at.
+    samples : Samples
+        In the order of time within each episode. Without groups each is taken by itself.
+
+    Returns
+    -------
+    Found
+        Of N samples.
+    """
     U = samples.actions.astype(np.float64, copy=False)
-    P = model.evaluate(samples.states, belief.w)
     N, d = U.shape
     ranks, known, rows = np.full(N, float(d)), np.zeros(N, dtype=bool), np.empty((0, d, d))
     if samples.projections is not None:

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.fitting.model import Model
+from unconstrain.fitting.model import LinearModel
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import observe, unknown
 from unconstrain.fitting.plausible import check_scale
@@ -64,12 +64,12 @@ class CorrectedMoments:
     n_actions: int
 
     @classmethod
-    def of(cls, model: Model, samples: Samples) -> "CorrectedMoments":
+    def of(cls, model: LinearModel, samples: Samples) -> "CorrectedMoments":
         """Sum samples up.
 
         Parameters
         ----------
-        model : Model
+        model : LinearModel
             With everything placed.
         samples : Samples
             Checked.
@@ -222,7 +222,7 @@ def add_up(parts: Sequence[Part]) -> Any:
     return reduce(add, parts)
 
 
-def _with_known(found: CorrectedMoments, model: Model, samples: Samples) -> CorrectedMoments:
+def _with_known(found: CorrectedMoments, model: LinearModel, samples: Samples) -> CorrectedMoments:
     """Add samples whose projection is known to moments that have none such."""
     X, U, N, weights = samples.states, samples.actions, samples.projections, samples.weights
     assert N is not None

@@ -14,7 +14,7 @@ from unconstrain.constraints.nullspace import in_metric
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.base import Features
 from unconstrain.fitting.decay import Decay
-from unconstrain.fitting.model import Model
+from unconstrain.fitting.model import LinearModel, Model
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 from unconstrain.fitting.posterior import Posterior
@@ -44,11 +44,6 @@ class InSpace:
     scale: np.ndarray | None = None
 
     @property
-    def features(self) -> Features:
-        """The fitted feature map; see `Model.features`."""
-        return self.model.features
-
-    @property
     def n_states(self) -> int:
         """Number of states n, as they are recorded."""
         return self.space.n_states
@@ -59,14 +54,47 @@ class InSpace:
         return self.model.n_actions
 
     @property
-    def n_models(self) -> int:
-        """Number of sets of parameters."""
-        return self.model.n_models
-
-    @property
     def width(self) -> float | np.ndarray | None:
         """Width of receptive fields; see `Model.width`."""
         return self.model.width
+
+    def evaluate(self, X: np.ndarray, w: Any) -> np.ndarray:
+        """Evaluate the policy, in units of the scale; see `Model.evaluate`."""
+        return self.model.evaluate(self.lay_out(X), w)
+
+    def lay_out(self, X: np.ndarray) -> np.ndarray:
+        """Lay states out as features see them; see `Model.lay_out`."""
+        if self.space.is_flat:
+            return X
+        try:
+            return self.space.embed(np.asarray(X, dtype=np.float64), self.base)
+        except ValueError:  # what scipy says of a quaternion of length zero, and of a matrix that mirrors
+            raise DataError(
+                f"some states are no rotation: those that this policy was learnt from are {self.space.words}"
+            ) from None
+
+    def compile(self, w: Any) -> Any:
+        """Compile the policy for a control loop; see `Model.compile`."""
+        from unconstrain.deploy import compiled
+
+        return compiled.InSpace(self.model.compile(w), self.space, self.base, self.scale)
+
+
+@dataclass(frozen=True)
+class LinearInSpace(InSpace):
+    """A model that is linear in its parameters, over such states."""
+
+    model: LinearModel
+
+    @property
+    def features(self) -> Features:
+        """The fitted feature map; see `Model.features`."""
+        return self.model.features
+
+    @property
+    def n_models(self) -> int:
+        """Number of sets of parameters."""
+        return self.model.n_models
 
     @property
     def shares_basis(self) -> bool:
@@ -89,10 +117,6 @@ class InSpace:
         """Turn parameters into a solution of the moments; see `Model.solution`."""
         return self.model.solution(parameters, n_targets)
 
-    def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Evaluate the policy, in units of the scale; see `Model.evaluate`."""
-        return self.model.evaluate(self.lay_out(X), w)
-
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
         """Compute second moments about predictions, in units of the scale; see `Model.covariance`."""
         return self.model.covariance(self.lay_out(X), P, posterior)
@@ -104,23 +128,6 @@ class InSpace:
     def reach(self, X: np.ndarray) -> np.ndarray:
         """Compute how much of a sample reaches each model; see `Model.reach`."""
         return self.model.reach(self.lay_out(X))
-
-    def lay_out(self, X: np.ndarray) -> np.ndarray:
-        """Lay states out as features see them; see `Model.lay_out`."""
-        if self.space.is_flat:
-            return X
-        try:
-            return self.space.embed(np.asarray(X, dtype=np.float64), self.base)
-        except ValueError:  # what scipy says of a quaternion of length zero, and of a matrix that mirrors
-            raise DataError(
-                f"some states are no rotation: those that this policy was learnt from are {self.space.words}"
-            ) from None
-
-    def compile(self, w: np.ndarray) -> Any:
-        """Compile the policy for a control loop; see `Model.compile`."""
-        from unconstrain.deploy import compiled
-
-        return compiled.InSpace(self.model.compile(w), self.space, self.base, self.scale)
 
 
 def in_units(scale: np.ndarray | None, samples: Samples) -> Samples:

@@ -1,9 +1,10 @@
 """What accumulators, estimators and diagnostics ask of a model.
 
-A model is a policy that is linear in its parameters: with everything placed, and without parameters. It says how
-samples add up to moments, and what parameters solved from them mean. It never changes, so threads and processes may
-share it. There are two: one set of parameters for all states (`global_model`), and local models that are blended
-(`local_models`).
+A model is a policy with everything placed, and without parameters: it says what parameters mean. It never changes, so
+threads and processes may share it. Parameters are whatever the model takes for them: an array, or a fitted regressor.
+
+Two models are linear in their parameters, and say how samples add up to moments as well: one set of parameters for all
+states (`global_model`), and local models that are blended (`local_models`).
 """
 
 from typing import Any, Protocol
@@ -18,12 +19,7 @@ from unconstrain.fitting.posterior import Posterior
 
 
 class Model(Protocol):
-    """What accumulators, estimators and diagnostics ask of a model."""
-
-    @property
-    def features(self) -> Features:
-        """The fitted feature map, of each of the models."""
-        ...
+    """What estimators ask of any model."""
 
     @property
     def n_states(self) -> int:
@@ -36,11 +32,6 @@ class Model(Protocol):
         ...
 
     @property
-    def n_models(self) -> int:
-        """Number S of sets of parameters, each of which is fitted by itself."""
-        ...
-
-    @property
     def scale(self) -> np.ndarray | None:
         """What a length of one is along each action, (d,); None for one. The model's actions are in this unit."""
         ...
@@ -48,6 +39,77 @@ class Model(Protocol):
     @property
     def width(self) -> float | np.ndarray | None:
         """Width σ of receptive fields, along each dimension of the states as features see them; None without any."""
+        ...
+
+    def evaluate(self, X: np.ndarray, w: Any) -> np.ndarray:
+        """Evaluate the policy.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+        w : object
+            Parameters of this model.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            Actions.
+        """
+        ...
+
+    def lay_out(self, X: np.ndarray) -> np.ndarray:
+        """Lay states out as features see them.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, m)
+            In which distances are taken.
+
+        Raises
+        ------
+        DataError
+            Some are no states of the model's space.
+        """
+        ...
+
+    def compile(self, w: Any) -> Any:
+        """Compile the policy for a control loop.
+
+        Parameters
+        ----------
+        w : object
+            Parameters of this model.
+
+        Returns
+        -------
+        CompiledPolicy
+            That agrees with `evaluate`.
+
+        Raises
+        ------
+        PolicyError
+            These features cannot be compiled.
+        """
+        ...
+
+
+class LinearModel(Model, Protocol):
+    """What accumulators and diagnostics ask of a model that is linear in its parameters."""
+
+    @property
+    def features(self) -> Features:
+        """The fitted feature map, of each of the models."""
+        ...
+
+    @property
+    def n_models(self) -> int:
+        """Number S of sets of parameters, each of which is fitted by itself."""
         ...
 
     @property
@@ -121,23 +183,6 @@ class Model(Protocol):
         """
         ...
 
-    def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Evaluate the policy.
-
-        Parameters
-        ----------
-        X : ndarray of shape (N, n)
-            States.
-        w : ndarray of shape (P,) or (S, P)
-            Parameters.
-
-        Returns
-        -------
-        ndarray of shape (N, d)
-            Actions.
-        """
-        ...
-
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
         """Compute second moments of the true policy about predictions.
 
@@ -186,45 +231,5 @@ class Model(Protocol):
         -------
         ndarray of shape (N, S)
             Weights, 0 to 1.
-        """
-        ...
-
-    def lay_out(self, X: np.ndarray) -> np.ndarray:
-        """Lay states out as features see them.
-
-        Parameters
-        ----------
-        X : ndarray of shape (N, n)
-            States.
-
-        Returns
-        -------
-        ndarray of shape (N, m)
-            In which distances are taken.
-
-        Raises
-        ------
-        DataError
-            Some are no states of the model's space.
-        """
-        ...
-
-    def compile(self, w: np.ndarray) -> Any:
-        """Compile the policy for a control loop.
-
-        Parameters
-        ----------
-        w : ndarray of shape (P,) or (S, P)
-            Parameters.
-
-        Returns
-        -------
-        CompiledPolicy
-            That agrees with `evaluate`.
-
-        Raises
-        ------
-        PolicyError
-            These features cannot be compiled.
         """
         ...

@@ -1,12 +1,11 @@
-"""What the policies share: options become a model, samples are added up, and the sums are solved."""
+"""What all policies share: an estimator that learns from states and actions, predicts, and is followed."""
 
-import warnings
 from abc import abstractmethod
 from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,18 +23,13 @@ from unconstrain.arrays import (
 from unconstrain.atomic import as_path
 from unconstrain.constraints.nullspace import constrain
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError, PolicyError
-from unconstrain.fitting.accumulator import NO_DIRECTION, Accumulator, Solution, find_informative_samples
-from unconstrain.fitting.calibration import Calibration
+from unconstrain.errors import PolicyError
+from unconstrain.fitting.accumulator import Solution
 from unconstrain.fitting.contact import Belief, infer
-from unconstrain.fitting.in_space import InSpace, find_scale, in_units
-from unconstrain.fitting.inference import infer_contact
+from unconstrain.fitting.in_space import InSpace, in_units
 from unconstrain.fitting.model import Model
-from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import RISKS, Observation, observe
-from unconstrain.fitting.posterior import Posterior
-from unconstrain.fitting.region import Region, find_apart, find_unit, unite
-from unconstrain.motion import moving
+from unconstrain.fitting.observation import Observation, observe
+from unconstrain.fitting.region import Region, find_apart, unite
 from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
 from unconstrain.spaces import Numbers, Space
@@ -47,61 +41,34 @@ if TYPE_CHECKING:
 
 
 class Policy(RegressorMixin, BaseEstimator):
-    """Base of the estimators `u = π(x)` that are linear in their parameters.
+    """Base of the estimators `u = π(x)`.
 
-    A subclass has its options, and `place`, which turns them into a model.
+    A subclass has its options, and `learn`, which turns samples into a model and what was found out with it.
 
     Attributes
     ----------
     model_ : Model
-        What was fixed before any sample was added: features, centres, widths.
+        What gives actions for states and parameters: dimensions, space of the states, scale of the actions.
     solution_ : Solution
         The parameters, and what their choice was based on.
-    accumulator_ : Accumulator
-        The sums they were solved from. A policy loaded from a file has them only where it was saved with
-        `resumable=True`.
     determined_share_ : float or None
         Share of the policy that the recordings it was compared on determine, where `evaluate_held_out` has looked.
     stability_ : Stability, Cycle or None
         What makes the policy end at a goal, or go round and round, in one that `stabilized` returned.
     """
 
+    risks: ClassVar[tuple[str, ...]] = ("adaptive", "inconsistency", "direct")
+
     risk: str
-    alpha: float | str
     space: Space | None
     scale: Any
     noise: float | None
     model_: Model
     solution_: Solution
-    accumulator_: Accumulator
     actions_are_scalars_: bool
     n_features_in_: int
     stability_: "Stability | Cycle | None" = None
     determined_share_: float | None = None
-
-    @abstractmethod
-    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
-        """Fix what depends on data.
-
-        Parameters
-        ----------
-        X : ndarray of shape (N, n)
-            States, checked.
-        d : int
-            Dimension of the actions.
-        sample_weight : ndarray of shape (N,)
-            Weight of each sample.
-
-        Returns
-        -------
-        Model
-            That samples are summed under.
-
-        Raises
-        ------
-        PolicyError
-            An option is impossible.
-        """
 
     def fit(
         self,
@@ -122,7 +89,7 @@ class Policy(RegressorMixin, BaseEstimator):
         y : array_like of shape (N, d) or (N,)
             Actions.
         groups : array_like of shape (N,), optional
-            Episode labels, the folds for `alpha="cv"`; without them contiguous blocks are the folds.
+            Episode labels, which are held out whole; without them contiguous blocks are.
         sample_weight : array_like of shape (N,), optional
             Multiplies each sample's squared error.
         projections : array_like of shape (N, d, d), optional
@@ -143,165 +110,31 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         fresh = self._without_stability()
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-        given = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
-        accumulator = fresh.start(samples, *given)
-        if self.risk == "adaptive":
-            accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
-        else:
-            accumulator.add(samples)
-        return self._adopt_from(fresh, accumulator, scalars)
+        space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
+        fresh.actions_are_scalars_ = scalars
+        fresh.learn(samples, space, noise)
+        return self._become(fresh)
 
-    def partial_fit(
-        self,
-        X: ArrayLike | Demonstrations,
-        y: ArrayLike | None = None,
-        *,
-        groups: ArrayLike | None = None,
-        sample_weight: ArrayLike | None = None,
-        projections: ArrayLike | None = None,
-    ) -> Self:
-        """Learn from more samples; the result is that of one `fit` on all samples so far.
-
-        With the adaptive risk it is not: which of the new samples were free is inferred by the policy as it is before
-        them, once, and what earlier ones were taken for stays. So begin with enough of them, or fit anew.
-
-        That is exact whatever the pieces when λ is a number and nothing is placed by the data (linear features,
-        centres and width given). Centres and other data-dependent features are placed by the first piece and kept; with
-        `alpha="cv"` give `groups`, whose episodes stay in their fold from piece to piece.
-
-        Parameters
-        ----------
-        X : array_like of shape (N, n), or Demonstrations
-            States.
-        y : array_like of shape (N, d) or (N,)
-            Actions.
-        groups : array_like of shape (N,), optional
-            Episode labels.
-        sample_weight : array_like of shape (N,), optional
-            Weight of each sample, 1 by default.
-        projections : array_like of shape (N, d, d), optional
-            The nullspace projection of each sample, all NaN where it is not known.
-
-        Returns
-        -------
-        self
-            Fitted.
-
-        Raises
-        ------
-        DataError, PolicyError
-            As for `fit`; the policy then stays as it was.
-        """
-        if not hasattr(self, "model_"):
-            return self.fit(X, y, groups=groups, sample_weight=sample_weight, projections=projections)
-        accumulator = self.resume()
-        fresh = copy(self)
-        samples, _ = check_input(fresh, X, y, groups, sample_weight, projections, first=False)
-        accumulator.longest = max(accumulator.longest, accumulator.total.longest)
-        accumulator.record = replace(accumulator.record, regression=None)  # to which nothing was added
-        fresh.determined_share_ = None
-        accumulator.add(samples)
-        if accumulator.total.misjudged:
-            raise DataError(
-                f"an action is {accumulator.total.longest:.3g} long, and beside it some that were learnt from, of "
-                f"length {accumulator.total.shortest:.3g}, do not move: leave it out, or fit anew to all together"
-            )
-        return self._adopt_from(fresh, accumulator, self.actions_are_scalars_)
-
-    def start(self, samples: Samples, space: Space | None = None, noise: float | None = None) -> Accumulator:
-        """Make an accumulator for this policy's options, its model placed by some samples.
+    @abstractmethod
+    def learn(self, samples: Samples, space: Space | None, noise: float | None) -> None:
+        """Set what is learnt, `model_` and `solution_`, on a fresh copy that `fit` then becomes.
 
         Parameters
         ----------
         samples : Samples
-            Checked. Those without motion or a known projection do not count in placing.
+            Checked.
         space : Space, optional
-            That the samples' states belong to; numbers by default. The policy's own, if it has one, comes first.
+            That the samples' states belong to, where it is known.
         noise : float, optional
-            Standard deviation of the actions' noise, where it is known of these recordings; the policy's own option
-            takes its place.
-
-        Returns
-        -------
-        Accumulator
-            Empty.
+            Standard deviation of the actions' noise, where it is known.
 
         Raises
         ------
+        DataError
+            There is nothing to learn from.
         PolicyError
             An option is impossible.
-        DataError
-            None of the samples says anything.
         """
-        self.check_options()
-        X, U, weights = samples.states, samples.actions, samples.weights
-        moves = moving(U)
-        counted = find_informative_samples(self.risk, samples, moves)
-        shows = (
-            counted if self.risk == "direct" else find_informative_samples("inconsistency", samples, moves)
-        )
-        if not shows.any():
-            raise DataError(NO_DIRECTION)
-        weights = np.ones(len(X)) if weights is None else weights
-        space = self.space or space or Numbers(X.shape[1])
-        _check_in_space(space, X)
-        scale = find_scale(self.scale, space, X, U.shape[1])
-        # Of actions in several units the noise in units of the scale is at least that of the largest.
-        sure = noise if noise is None or scale is None else noise / float(scale.max())
-        known = float((sure if self.noise is None else self.noise) or 0.0) ** 2
-        base = None if space.is_flat else space.find_base(X[counted])
-        Z = X[counted] if space.is_flat else space.embed(X[counted], base)
-        model = self.place(Z, U.shape[1], weights[counted])
-        if not (space.is_flat and scale is None):
-            model = InSpace(model, space, base, scale)
-        return Accumulator(model, self.risk, self.alpha, noise=known, unit=find_unit(Z, model.width))
-
-    def resume(self) -> Accumulator:
-        """Copy the sums that this policy was solved from, to add to them.
-
-        Returns
-        -------
-        Accumulator
-            With the same sums.
-
-        Raises
-        ------
-        PolicyError
-            The policy was saved without them.
-        """
-        check_is_fitted(self)
-        if not hasattr(self, "accumulator_"):
-            raise PolicyError(
-                "this policy was saved without the sums it was solved from: save it with resumable=True to go on "
-                "learning, or to know how sure it is"
-            )
-        accumulator = self.accumulator_.copy()
-        accumulator.belief = self.solution_.belief
-        return accumulator
-
-    def finish(self, accumulator: Accumulator, *, scalar_actions: bool = False) -> Self:
-        """Solve what was added up elsewhere, and become that policy.
-
-        Parameters
-        ----------
-        accumulator : Accumulator
-            From `start` or `resume`.
-        scalar_actions : bool
-            Whether `predict` returns actions of shape (N,).
-
-        Returns
-        -------
-        self
-            Fitted.
-
-        Raises
-        ------
-        DataError
-            There is nothing to learn from; the policy then stays as it was.
-        """
-        fresh = self._without_stability()
-        fresh.n_features_in_ = accumulator.model.n_states
-        return self._adopt_from(fresh, accumulator, scalar_actions)
 
     def predict(
         self, X: ArrayLike, return_std: bool = False, return_cov: bool = False
@@ -322,14 +155,14 @@ class Policy(RegressorMixin, BaseEstimator):
         U : ndarray of shape (N, d)
             Or (N,), where the policy was fitted to actions of that shape.
         spread : ndarray of shape (N, d) or (N, d, d)
-            Where asked for; see `fitting.posterior`. Of a stabilised policy, that of the policy it was made of.
+            Where asked for; see `covariance`. Of a stabilised policy, that of the policy it was made of.
 
         Raises
         ------
         DataError
             The states are not finite or not of the dimension learnt.
         PolicyError
-            Both spreads are asked for, or the policy was saved without its sums.
+            Both spreads are asked for, or the policy cannot tell them.
         """
         check_is_fitted(self)
         if return_std and return_cov:
@@ -343,7 +176,7 @@ class Policy(RegressorMixin, BaseEstimator):
             actions = self.stability_.stabilize(X, actions)
         if not (return_std or return_cov):
             return actions[:, 0] if self.actions_are_scalars_ else actions
-        covariance = self._in_own_units(self.model_.covariance(X, scaled, self.posterior()))
+        covariance = self.covariance(X)
         spread = covariance if return_cov else np.sqrt(np.maximum(np.einsum("njj->nj", covariance), 0.0))
         if self.actions_are_scalars_:
             return actions[:, 0], spread.reshape(len(X))
@@ -378,6 +211,50 @@ class Policy(RegressorMixin, BaseEstimator):
         if self.stability_ is not None:
             return self.stability_.stabilize(X, own, projections)
         return constrain(projections, own, self.model_.scale)
+
+    def covariance(self, X: ArrayLike) -> np.ndarray:
+        """Compute how far the true policy may be from `predict`.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n)
+            States.
+
+        Returns
+        -------
+        ndarray of shape (N, d, d)
+            Second moments of the deviation, in squared units of the action.
+
+        Raises
+        ------
+        PolicyError
+            Policies of this kind do not tell.
+        """
+        raise PolicyError(
+            f"a {type(self).__name__} does not tell how sure it is: a LocallyLinearPolicy, a ParametricPolicy and a "
+            "GaussianProcessPolicy do"
+        )
+
+    def prepare_covariance(self) -> Callable[[np.ndarray], np.ndarray]:
+        """Return `covariance`, with what does not hang on the states computed beforehand.
+
+        Returns
+        -------
+        callable
+            From states (N, n) to second moments (N, d, d).
+        """
+        return self.covariance
+
+    def usual_speed(self) -> float:
+        """Compute the root mean square length of the actions learnt from, in units of `scale_`.
+
+        Returns
+        -------
+        float
+            Above zero.
+        """
+        check_is_fitted(self)
+        return self.solution_.usual_speed
 
     def stabilized(
         self,
@@ -452,72 +329,6 @@ class Policy(RegressorMixin, BaseEstimator):
         held.stability_ = self.stability_.held_for(float(seconds))
         return held
 
-    def posterior(self) -> Posterior:
-        """Compute the distribution of the parameters and the noise of the actions, by an eigendecomposition.
-
-        With the adaptive risk the noise is that which was inferred, for as many samples as are independent, and the
-        covariance is as wide as held-out samples say (`fitting.calibration`). With the corrected risk the noise is what
-        the noise that was found makes of the residuals. With the others it is estimated: each sample is taken to show
-        one number, or d where nothing is projected. One whose projection is known may show
-        more, which moments do not count; the noise is then overestimated, and deviations err on the side of caution.
-
-        Returns
-        -------
-        Posterior
-            See `fitting.posterior`.
-
-        Raises
-        ------
-        PolicyError
-            The policy was saved without its sums.
-        """
-        moments = self.resume().moments()
-        decay = self.model_.decay(moments)
-        if self.risk == "corrected":
-            return Posterior.of(moments, decay=decay, noise=self.solution_.residual)
-        calibration = self.calibration()
-        if calibration is not None:
-            return calibration.posterior(moments, decay)
-        return Posterior.of(moments, self.n_actions_ if self.risk == "direct" else 1, decay)
-
-    def calibration(self) -> Calibration | None:
-        """Measure on held-out folds how wide the posterior has to be.
-
-        Returns
-        -------
-        Calibration or None
-            With the adaptive risk, what was held out says; of a policy that was saved without its sums, the noise
-            alone. None with other risks, whose noise is estimated with the posterior.
-        """
-        check_is_fitted(self)
-        belief = self.solution_.belief
-        if belief is None:
-            return None
-        if not hasattr(self, "accumulator_"):
-            return Calibration(belief.noise.action / self.solution_.evidence)
-        return Calibration.of(self.resume(), self.solution_)
-
-    def covariance(self, X: ArrayLike, posterior: Posterior | None = None) -> np.ndarray:
-        """Compute how far the true policy may be from `predict`.
-
-        Parameters
-        ----------
-        X : array_like of shape (N, n)
-            States.
-        posterior : Posterior, optional
-            By default that of the samples learnt from.
-
-        Returns
-        -------
-        ndarray of shape (N, d, d)
-            Second moments of the deviation, in squared units of the action.
-        """
-        check_is_fitted(self)
-        X = check_states(self, X)
-        scaled = self.model_.evaluate(X, self.solution_.w)
-        posterior = self.posterior() if posterior is None else posterior
-        return self._in_own_units(self.model_.covariance(X, scaled, posterior))
-
     def distance(self, X: ArrayLike) -> np.ndarray:
         """Compute how far states lie from those that were learnt from.
 
@@ -563,23 +374,6 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         return max(1.0, find_apart(self.solution_.regions))
-
-    def usual_speed(self) -> float:
-        """Compute the root mean square length of the actions learnt from, in units of `scale_`.
-
-        Returns
-        -------
-        float
-            Above zero.
-
-        Raises
-        ------
-        PolicyError
-            The policy was saved without its sums.
-        """
-        moments = self.resume().moments()
-        whole = moments if moments.everywhere is None else moments.everywhere
-        return float(np.sqrt(np.sum(whole.squares) / np.sum(whole.weight)))
 
     def free_probability(
         self,
@@ -731,15 +525,14 @@ class Policy(RegressorMixin, BaseEstimator):
         return rollout(self, start, steps, dt, constraint, stop_when=stop_when, beyond=beyond, limits=limits)
 
     def save(self, path: str | PathLike[str], *, resumable: bool = False) -> None:
-        """Write the policy to a file that `load_policy` reads. Nothing in it is code.
+        """Write the fitted policy to a file, whole or not at all; `load_policy` reads it.
 
         Parameters
         ----------
         path : path
-            Customarily it ends in ``.skops``. An existing file is replaced.
+            An existing file is replaced.
         resumable : bool
-            Keep the sums too. Without them the file is small, and the policy that is read back predicts, but cannot
-            learn on (`partial_fit`), tell how sure it is (`return_std`), or be solved anew (`solved`).
+            Keep what learning on needs, where policies of this kind can.
 
         Raises
         ------
@@ -749,10 +542,29 @@ class Policy(RegressorMixin, BaseEstimator):
         from unconstrain.policies.saving import save_policy
 
         check_is_fitted(self)
-        kept = copy(self)
-        if not resumable and hasattr(kept, "accumulator_"):
-            del kept.accumulator_
-        save_policy(kept, path)
+        save_policy(self, path)
+
+    def ordinary_regression(self) -> Self | None:
+        """Return ordinary regression by the same kind of policy to the same samples, to be held against this one.
+
+        Returns
+        -------
+        Policy or None
+            That predicts, but cannot learn on; None where it is not known.
+        """
+        check_is_fitted(self)
+        solution = self.solution_ if self.risk == "direct" else self.solution_.record.regression
+        if solution is None:
+            return None
+        other = self._without_stability()
+        other.risk, other.solution_ = "direct", replace(solution, regions=self.solution_.regions)
+        return other
+
+    def check_options(self) -> None:
+        """Raise `PolicyError` for a risk or a noise that is none."""
+        check_choice(self.risk, "risk", self.risks)
+        if self.noise is not None:
+            check_number(self.noise, "noise", positive=False)
 
     def compile(self) -> "CompiledPolicy":
         """Compile the fitted policy for a control loop.
@@ -799,54 +611,6 @@ class Policy(RegressorMixin, BaseEstimator):
 
         onnx.save(self.compile(), as_path(path))
 
-    def solved(self, *, without: int | None = None) -> Self:
-        """Solve anew for `alpha`, if asked without the samples of one fold, in a copy of this policy.
-
-        Parameters
-        ----------
-        without : int, optional
-            The fold left out. With `alpha="cv"` λ is then chosen among the others.
-
-        Returns
-        -------
-        Policy
-            The solved copy.
-
-        Raises
-        ------
-        DataError
-            Nothing is left to learn from.
-        PolicyError
-            The policy was saved without its sums.
-
-        Notes
-        -----
-        It costs no pass over the data: it is what makes cross-validation of a whole policy cheap.
-        """
-        accumulator = self.resume()
-        left = copy(self)
-        left.solution_ = accumulator.solve(self.alpha, without)
-        return left
-
-    def ordinary_regression(self) -> Self | None:
-        """Return ordinary regression by the same model to the same samples, to be held against this policy.
-
-        Returns
-        -------
-        Policy or None
-            That predicts, but cannot learn on. None where it is not known: with other risks than "adaptive" and
-            "direct", unless `compare_risks` has made it, and after `partial_fit`.
-        """
-        check_is_fitted(self)
-        solution = self.solution_ if self.risk == "direct" else self.solution_.record.regression
-        if solution is None:
-            return None
-        other = self._without_stability()
-        other.risk, other.solution_ = "direct", replace(solution, regions=self.solution_.regions)
-        if hasattr(other, "accumulator_"):
-            del other.accumulator_
-        return other
-
     def scaled(self, U: np.ndarray) -> np.ndarray:
         """Divide actions by the scale, so that their lengths and angles are those that the policy was learnt by.
 
@@ -862,16 +626,6 @@ class Policy(RegressorMixin, BaseEstimator):
         """
         scale = self.model_.scale
         return U if scale is None else U / scale
-
-    def check_options(self) -> None:
-        """Raise `PolicyError` for a risk, a weight decay or a noise that is none."""
-        check_choice(self.risk, "risk", RISKS)
-        if isinstance(self.alpha, str):
-            check_choice(self.alpha, "alpha, where it is not a number,", ("cv",))
-        else:
-            check_number(self.alpha, "alpha", positive=False)
-        if self.noise is not None:
-            check_number(self.noise, "noise", positive=False)
 
     @property
     def n_actions_(self) -> int:
@@ -893,21 +647,6 @@ class Policy(RegressorMixin, BaseEstimator):
     def distance_unit_(self) -> str:
         """What `distance` counts in: widths of receptive fields, or, of a policy without these, half the spread."""
         return "half-spreads" if self.model_.width is None else "receptive fields"
-
-    @property
-    def alpha_(self) -> float:
-        """The weight decay λ that was used, a pure number; see `fitting.decay`."""
-        return self.solution_.alpha
-
-    @property
-    def alphas_(self) -> np.ndarray:
-        """The candidates for λ, (25,), where it was chosen."""
-        return _where_chosen(self.solution_.alphas, "alphas_")
-
-    @property
-    def held_out_risk_(self) -> np.ndarray:
-        """The held-out risk of each candidate for λ, (25,), in squared units of the action, where it was chosen."""
-        return _where_chosen(self.solution_.held_out_risk, "held_out_risk_")
 
     @property
     def noise_(self) -> float:
@@ -961,11 +700,6 @@ class Policy(RegressorMixin, BaseEstimator):
         """Of how many of them the projection was known."""
         return self.solution_.n_known
 
-    @property
-    def moments_(self) -> list[Moments | None]:
-        """The moments by fold, those of the corrected risk for `noise_`; None where a fold has no samples."""
-        return self.resume().by_fold()
-
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.target_tags.single_output = True
@@ -996,33 +730,10 @@ class Policy(RegressorMixin, BaseEstimator):
             raise PolicyError(message) if name == "free_probability" else AttributeError(message)
         return belief
 
-    def _adopt_from(self, fresh: Self, accumulator: Accumulator, scalars: bool) -> Self:
+    def _become(self, fresh: Self) -> Self:
         """Become the policy that was prepared on a copy. Nothing here changes before all of it has succeeded."""
-        fresh.model_, fresh.accumulator_ = accumulator.model, accumulator
-        fresh.solution_, fresh.actions_are_scalars_ = accumulator.solve(), scalars
-        if fresh.solution_.doubt:
-            warnings.warn(fresh.solution_.doubt, stacklevel=3)
         for name, value in vars(fresh).items():
             setattr(self, name, value)
         if not hasattr(fresh, "feature_names_in_") and hasattr(self, "feature_names_in_"):
             del self.feature_names_in_
         return self
-
-
-def _check_in_space(space: Any, X: np.ndarray) -> None:
-    """Raise an error where states (N, n) are not of the space."""
-    if not isinstance(space, Space):
-        raise PolicyError(f"space must be a kind of state of unconstrain.spaces, got {space!r:.60}")
-    if space.n_states != X.shape[1]:
-        raise PolicyError(
-            f"states have {X.shape[1]} numbers, and those of the space {space.n_states}: {space.words}"
-        )
-    faults = space.faults(X)
-    if faults.any():
-        raise DataError(f"the states of sample {int(np.argmax(faults))} are none of these: {space.words}")
-
-
-def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:
-    if value is None:
-        raise AttributeError(f'{name} is there only after a fit with alpha="cv"')
-    return value

@@ -15,12 +15,12 @@ from unconstrain.features.centers import place_centers
 from unconstrain.features.full import as_features
 from unconstrain.fitting.in_space import InSpace
 from unconstrain.fitting.local_models import PRIORS, LocalModels
-from unconstrain.fitting.model import Model
-from unconstrain.policies.base import Policy
+from unconstrain.fitting.model import LinearModel
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.spaces import Space
 
 
-class LocallyLinearPolicy(Policy):
+class LocallyLinearPolicy(LinearPolicy):
     """The policy `π(x) = Σ_m ω_m(x) B_m (x, 1)`, with `ω_m = K_m / Σ_j K_j` and `K_m(x) = exp(-‖x - c_m‖² / 2σ²)`.
 
     Each B_m minimises the risk with its samples weighted by K_m, whatever the other models do. Where those samples are
@@ -103,7 +103,7 @@ class LocallyLinearPolicy(Policy):
         self.space = space
         self.scale = scale
 
-    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
+    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> LinearModel:
         """Place the centres and fit the features.
 
         Parameters

@@ -13,12 +13,12 @@ from unconstrain.features.base import Features, LinearInState, fit_features
 from unconstrain.features.full import as_features
 from unconstrain.fitting.global_model import GlobalModel
 from unconstrain.fitting.in_space import InSpace
-from unconstrain.fitting.model import Model
-from unconstrain.policies.base import Policy
+from unconstrain.fitting.model import LinearModel
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.spaces import Space
 
 
-class ParametricPolicy(Policy):
+class ParametricPolicy(LinearPolicy):
     """The unconstrained policy `π(x) = Φ(x) w` behind constrained movements, `w` of least risk and weight decay.
 
     Parameters
@@ -101,7 +101,7 @@ class ParametricPolicy(Policy):
         self.scale = scale
         self.noise = noise
 
-    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> Model:
+    def place(self, X: np.ndarray, d: int, sample_weight: np.ndarray) -> LinearModel:
         """Fit the features.
 
         Parameters

@@ -169,7 +169,7 @@ def _find_states(policy: "Policy", demos: "Demonstrations | ArrayLike") -> np.nd
 
 def _find_centers(policy: "Policy") -> np.ndarray:
     """Return the centres that a policy was learnt about, as states."""
-    features = policy.model_.features
+    features = getattr(policy.model_, "features", None)
     for holder in (policy, features, getattr(features, "transformer_", None)):
         centers = getattr(holder, "centers_", None)
         if centers is not None:

@@ -29,7 +29,7 @@ class Unsure:
     def __init__(self, policy: Policy, share: float):
         self.policy = policy
         self.share = check_number(share, "the share of the speed", positive=True)
-        self.posterior = policy.posterior()
+        self.covariance = policy.prepare_covariance()
         self.usual = policy.usual_speed()
         self.least = 0.0
 
@@ -73,6 +73,6 @@ class Unsure:
             Length of the predicted action, and at least that of a usual one.
         """
         P = self.policy.scaled(np.reshape(self.policy.predict(X), (len(X), -1)))
-        covariance = self.policy.covariance(X, self.posterior)
+        covariance = self.covariance(X)
         variance = np.einsum("njj,j->n", covariance, 1.0 / self.policy.scale_**2)
         return np.sqrt(np.maximum(variance, 0.0)), np.maximum(np.linalg.norm(P, axis=1), self.usual)

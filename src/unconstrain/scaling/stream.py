@@ -29,6 +29,7 @@ from unconstrain.fitting.inference import Inference
 from unconstrain.fitting.solve import ONE_FOLD
 from unconstrain.fitting.sums import Sums
 from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.progress import Report, reporting
 from unconstrain.progress import begin as begin_pass
 from unconstrain.recordings.blocks import Block, Loaded, Source
@@ -45,7 +46,7 @@ ONCE = (
     'function that returns them anew, or choose risk="corrected", "inconsistency" or "direct"'
 )
 
-PolicyT = TypeVar("PolicyT", bound=Policy)
+PolicyT = TypeVar("PolicyT", bound=LinearPolicy)
 
 
 def fit_stream(
@@ -160,7 +161,7 @@ def fit_stream(
 
 
 def open_for(
-    policy: Policy,
+    policy: LinearPolicy,
     recordings: Openable,
     batch_rows: int,
 ) -> Recordings:
@@ -171,7 +172,13 @@ def open_for(
     PolicyError
         The policy cannot be learnt from them.
     """
-    if not isinstance(policy, Policy):
+    if not isinstance(policy, LinearPolicy):
+        if isinstance(policy, Policy):
+            raise PolicyError(
+                f"a {type(policy).__name__} needs all samples at once, and a stream is read block by block: a "
+                "ParametricPolicy and a LocallyLinearPolicy learn from it, with any risk but the adaptive one in one "
+                "pass; or load fewer samples"
+            )
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")
     policy.check_options()
     check_batch_rows(batch_rows)
@@ -181,7 +188,7 @@ def open_for(
     return opened
 
 
-def check_episodes(policy: Policy, source: Source, *, partial: bool) -> None:
+def check_episodes(policy: LinearPolicy, source: Source, *, partial: bool) -> None:
     """Find out before a long pass that there is one episode, where λ is to be chosen on held-out ones.
 
     Nothing but the episode column is read, and no further than to the second episode.
@@ -203,7 +210,7 @@ def check_episodes(policy: Policy, source: Source, *, partial: bool) -> None:
 
 
 def begin(
-    policy: Policy, source: Source, sample_rows: int, random_state: int | None, *, partial: bool
+    policy: LinearPolicy, source: Source, sample_rows: int, random_state: int | None, *, partial: bool
 ) -> Accumulator:
     """Make an accumulator, its model placed on a sample of the source, or going on from the policy's own sums."""
     goes_on = partial and hasattr(policy, "model_")
@@ -260,7 +267,7 @@ def to_infer(blank: Accumulator) -> Progress:
     return Progress(wanted, Sums(), 0, (), inference)
 
 
-def source_for(policy: Policy, source: Source, *, partial: bool) -> Source:
+def source_for(policy: LinearPolicy, source: Source, *, partial: bool) -> Source:
     """Return the source as it is to be read: with whole episodes in blocks where contact is inferred along them.
 
     Raises

@@ -30,7 +30,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.fitting.contact": ("Belief", "Tally"),
     "unconstrain.fitting.corrected": ("CorrectedMoments",),
     "unconstrain.fitting.drift": ("Drift", "Drifts"),
-    "unconstrain.fitting.in_space": ("InSpace",),
+    "unconstrain.fitting.in_space": ("InSpace", "LinearInSpace"),
     "unconstrain.fitting.inference": ("Inference", "Run"),
     "unconstrain.fitting.noise": ("Noise", "Squares"),
     "unconstrain.fitting.region": ("Region",),

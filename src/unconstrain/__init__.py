@@ -27,7 +27,14 @@ if TYPE_CHECKING:
     from unconstrain.evaluation import Evaluation, evaluate
     from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
     from unconstrain.fitting import moments
-    from unconstrain.policies import LocallyLinearPolicy, ParametricPolicy, load_compiled, load_policy
+    from unconstrain.gaussian_process import kernels
+    from unconstrain.policies import (
+        GaussianProcessPolicy,
+        LocallyLinearPolicy,
+        ParametricPolicy,
+        load_compiled,
+        load_policy,
+    )
     from unconstrain.recordings import Columns, Inspection, Preparation, Recordings, inspect, load, open
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
@@ -43,6 +50,7 @@ __all__ = [
     "Demonstrations",
     "Evaluation",
     "FeatureConstraint",
+    "GaussianProcessPolicy",
     "Inspection",
     "LocallyLinearPolicy",
     "MechanismConstraint",
@@ -60,6 +68,7 @@ __all__ = [
     "fit_stream",
     "identifiability",
     "inspect",
+    "kernels",
     "load",
     "load_compiled",
     "load_constraint",
@@ -86,7 +95,13 @@ _HOMES = {
     "unconstrain.diagnostics": ("identifiability",),
     "unconstrain.evaluation": ("Evaluation", "evaluate"),
     "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
-    "unconstrain.policies": ("LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"),
+    "unconstrain.policies": (
+        "GaussianProcessPolicy",
+        "LocallyLinearPolicy",
+        "ParametricPolicy",
+        "load_compiled",
+        "load_policy",
+    ),
     "unconstrain.recordings": (
         "Columns",
         "Inspection",
@@ -106,6 +121,7 @@ _NAMESPACES = {
     "distributed": "unconstrain.scaling.cluster",
     "errors": "unconstrain.errors",
     "features": "unconstrain.features",
+    "kernels": "unconstrain.gaussian_process.kernels",
     "metrics": "unconstrain.metrics",
     "moments": "unconstrain.fitting.moments",
     "plot": "unconstrain.plot",

@@ -36,6 +36,10 @@ MOST_ROWS = 500
 LEAST_NOISE = 1e-8
 """Variance of the noise in squared units of the root mean square action."""
 
+AMPLITUDES, WIDTHS = (1e-5, 1e2), (5e-2, 5e2)
+"""Between which variances of parts, in squared units of the root mean square action, and widths, in spreads of the
+states, are searched. Larger ones leave no digit of the variances."""
+
 DECISIVE = 3.0
 """Log-likelihood by which a later candidate has to beat an earlier one."""
 
@@ -87,14 +91,14 @@ def candidates(n_states: int, n_actions: int) -> dict[str, Any]:
     d = n_actions
 
     def part(kernel: Any) -> Any:
-        return ConstantKernel(1.0, (1e-5, 1e5)) * Separable(kernel, d)
+        return ConstantKernel(1.0, AMPLITUDES) * Separable(kernel, d)
 
     linear = DotProduct(1.0, "fixed")
-    smooth = part(RBF(1.5, (5e-2, 5e2))) + part(linear)
-    found = {SMOOTH: smooth, CUBIC: smooth + ConstantKernel(0.1, (1e-5, 1e5)) * Separable(linear**3, d)}
+    smooth = part(RBF(1.5, WIDTHS)) + part(linear)
+    found = {SMOOTH: smooth, CUBIC: smooth + ConstantKernel(0.1, AMPLITUDES) * Separable(linear**3, d)}
     if n_states == n_actions:
-        bent = ConstantKernel(1.0, (1e-5, 1e5)) * CurlFree(1.5, (5e-2, 5e2))
-        straight = ConstantKernel(1.0, (1e-5, 1e5)) * CurlFreeQuadratic()
+        bent = ConstantKernel(1.0, AMPLITUDES) * CurlFree(1.5, WIDTHS)
+        straight = ConstantKernel(1.0, AMPLITUDES) * CurlFreeQuadratic()
         found[POTENTIAL] = bent + straight + part(ConstantKernel(1.0, "fixed"))
     return found
 

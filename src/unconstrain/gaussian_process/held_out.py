@@ -31,7 +31,7 @@ from unconstrain.gaussian_process.inducing import InducingFeatures
 from unconstrain.gaussian_process.process import Process
 from unconstrain.gaussian_process.rows import Rows
 
-NARROWEST, WIDEST = 0.5, 1e4
+NARROWEST, WIDEST = 1.0, 1e4
 """Between which covariances are widened."""
 
 LEAST_TOLD = 0.2

@@ -173,6 +173,10 @@ class CurlFreeQuadratic(Kernel):
         # Kernels list their parameters by the signature, and that of `object` takes anything.
         pass
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Of an object without attributes the default is None, which files do not take for a state.
+        return {}
+
     def __call__(self, X: Array, Y: Array | None = None, eval_gradient: bool = False) -> Any:
         """Compute covariances of rows (N, 2n) with others; the gradient has no columns."""
         x, q = split(X, None)

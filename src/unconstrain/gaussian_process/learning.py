@@ -2,8 +2,7 @@
 
 The published risks are observed once: the likeliest kernel is found, and conditioned on all rows. Which samples were
 free is inferred on few inducing rows first, whose features are a model like any other (`fitting.inference`): it starts
-from both ends and lowers the noise. From where "all free" and the likeliest of its other runs end, and from the process
-of the inconsistency, each further pass
+from both ends and lowers the noise. From where "all free" and the likeliest of its other runs end, each further pass
 
 1. infers which samples were free by the process as it is, and what they say of the policy (`fitting.contact`),
 2. finds kernel and noise anew, in the first of these passes and in the third,
@@ -21,9 +20,7 @@ from typing import Any
 import numpy as np
 
 from unconstrain.fitting.accumulator import Accumulator
-from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
-from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.inference import (
     DECISIVE,
     FREE,
@@ -49,7 +46,7 @@ INFERRING = 420
 """Inducing rows that contact is inferred with at first."""
 
 MOST_PASSES, LEARNING = 8, (0, 2)
-"""Passes of the process at most, and those in which the kernel is found anew."""
+"""Passes of the process at most, and those in which the kernel is found anew. Where all is free the first is enough."""
 
 SETTLED = 1e-3
 """Root mean square change of the policy, as a share of it, that is not worth another pass."""
@@ -57,7 +54,8 @@ SETTLED = 1e-3
 LEAST_LEFT = 0.2
 """Share of the observed numbers that is taken to be left for the noise, at least."""
 
-FROM_PROCESS = "inferred, from the inconsistency's process"
+ENOUGH = 1e-2
+"""Difference in log-likelihood per sample by which two runs have ended apart."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +159,8 @@ class Learnt:
         Held-out log-likelihood of a sample, by what was assumed, the chosen first.
     history : tuple of dict
         One for each pass.
+    regression : Process, optional
+        Ordinary regression, where inference began with it.
     """
 
     process: Process
@@ -169,6 +169,7 @@ class Learnt:
     tally: Tally | None = None
     log_likelihoods: dict[str, float] | None = None
     history: tuple[dict[str, Any], ...] = ()
+    regression: Process | None = None
 
 
 @dataclass(frozen=True)
@@ -244,27 +245,19 @@ def learn_adaptively(
         With the belief.
     """
     samples = problem.samples
-    conditioned, evidence = _condition_published(problem, "inconsistency")
+    evidence = problem.find_evidence(observe("inconsistency", samples.actions, samples.projections))
     features = place_features(evidence, samples.states, samples.actions.shape[1], INFERRING)
     inducing, blank = make_inference(features)
     inference = Inference(blank)
     while (wanted := inference.next_pass()) is not None:
         wanted.add(samples)
         inference.take(wanted)
-    first = Noise(max(evidence.noise * evidence.size**2, problem.floor))
-    of_process = Belief(
-        conditioned.process, first, Chain(), Drift() if samples.actions.shape[1] > 1 else None
-    )
     runs = {run.name: run for run in inference.runs}
-    found = [runs[name] for name in INFERRED if name in runs]
-    wanted_runs = {
-        max(found, key=lambda run: run.log_likelihood).name,
-        max(found, key=lambda run: inference.likelihoods[run.name]).name,
-        next(iter(inference.likelihoods)),
-        FREE,
-    }
+    wanted_runs = {FREE, next(iter(inference.likelihoods))}
+    found = max((runs[name] for name in INFERRED if name in runs), key=lambda run: run.log_likelihood)
+    if all(abs(found.log_likelihood - runs[name].log_likelihood) > ENOUGH * len(samples.states) for name in wanted_runs):
+        wanted_runs.add(found.name)
     starts = [(name, run.end, inducing) for name, run in runs.items() if name in wanted_runs]
-    starts.append((FROM_PROCESS, of_process, model))
     ends = {name: _pass_on(problem, model, name, start, first) for name, start, first in starts}
     return _compare(problem, model, ends)
 
@@ -319,7 +312,8 @@ def _pass_on(problem: Problem, model: Any, name: str, belief: Belief, first: Any
         )
         change = np.sum((after - before) ** 2)
         before = after
-        if change <= SETTLED**2 * np.sum(after**2) and number >= LEARNING[-1]:
+        is_settled = change <= SETTLED**2 * np.sum(after**2) and number >= LEARNING[-1]
+        if is_settled or belief.held == "free":
             break
     return End(name, conditioned, evidence, belief, found.tally, history)
 
@@ -343,7 +337,8 @@ def _compare(problem: Problem, model: Any, ends: dict[str, End]) -> Learnt:
     process = replace(best.conditioned.process, widening=widenings[best.name])
     history = tuple(each for end in ends.values() for each in end.history)
     belief = replace(best.belief, w=process.without_variances())
-    return Learnt(process, best.evidence, belief, best.tally, likelihoods, history)
+    regression = ends[FREE].conditioned.process.without_variances()
+    return Learnt(process, best.evidence, belief, best.tally, likelihoods, history, regression)
 
 
 def _held_out_likelihood(

@@ -28,8 +28,11 @@ from unconstrain.gaussian_process.rows import Rows
 BLOCK = 2**22
 """How many covariances are computed at a time."""
 
-JITTER = 1e-11
+JITTER = 1e-12
 """Share of the mean variance that is added to every row's, so that factors exist."""
+
+ROUNDING = 1e-11
+"""Share of the prior's variance that rounding leaves of the posterior's, at least."""
 
 
 @dataclass(frozen=True)
@@ -120,12 +123,13 @@ class Process:
         for rows in self._blocks(len(X)):
             seen = every_direction(self.scaling(X[rows]), d)
             features = (self.kernel(seen, self.pairs) @ self.whitener).reshape(-1, d, self.whitener.shape[1])
-            covariance[rows] = self._prior(seen, d) - features @ features.swapaxes(1, 2)
+            prior = self._prior(seen, d)
+            covariance[rows] = prior - features @ features.swapaxes(1, 2)
             if self.left is not None:
                 covariance[rows] += features @ self.left @ features.swapaxes(1, 2)
-        # Rounding of a difference may leave less than nothing of a variance.
-        axis = np.arange(d)
-        covariance[:, axis, axis] = np.maximum(covariance[:, axis, axis], JITTER)
+            least = ROUNDING * np.einsum("njj->nj", prior)
+            axis = np.arange(d)
+            covariance[rows, axis, axis] = np.maximum(covariance[rows, axis, axis], least)
         return self.widening * self.size**2 * covariance
 
     def without_variances(self) -> "Process":

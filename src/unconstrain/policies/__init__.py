@@ -1,8 +1,16 @@
 """Policies as scikit-learn estimators."""
 
 from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
+from unconstrain.policies.gaussian_process import GaussianProcessPolicy
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.policies.saving import load_policy
 
-__all__ = ["CompiledPolicy", "LocallyLinearPolicy", "ParametricPolicy", "load_compiled", "load_policy"]
+__all__ = [
+    "CompiledPolicy",
+    "GaussianProcessPolicy",
+    "LocallyLinearPolicy",
+    "ParametricPolicy",
+    "load_compiled",
+    "load_policy",
+]

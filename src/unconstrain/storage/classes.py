@@ -15,6 +15,10 @@ from typing import Any
 _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.policies.parametric": ("ParametricPolicy",),
     "unconstrain.policies.locally_linear": ("LocallyLinearPolicy",),
+    "unconstrain.policies.gaussian_process": ("GaussianProcessPolicy",),
+    "unconstrain.gaussian_process.kernels": ("CurlFree", "CurlFreeQuadratic", "Separable"),
+    "unconstrain.gaussian_process.model": ("GaussianProcessModel",),
+    "unconstrain.gaussian_process.process": ("Process",),
     "unconstrain.features.full": ("FullFeatures",),
     "unconstrain.features.decoupled": ("DecoupledFeatures",),
     "unconstrain.features.potential": ("PotentialFeatures",),
@@ -51,6 +55,17 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.stability.stabilizing": ("Stability",),
     "sklearn.compose": ("ColumnTransformer",),
     "sklearn.decomposition": ("PCA", "TruncatedSVD"),
+    "sklearn.gaussian_process.kernels": (
+        "ConstantKernel",
+        "DotProduct",
+        "ExpSineSquared",
+        "Exponentiation",
+        "Matern",
+        "Product",
+        "RBF",
+        "RationalQuadratic",
+        "Sum",
+    ),
     "sklearn.kernel_approximation": ("Nystroem", "RBFSampler"),
     "sklearn.pipeline": ("FeatureUnion", "Pipeline"),
     "sklearn.preprocessing": (

@@ -13,7 +13,9 @@ next. So whatever the noise, products of errors of samples that follow each othe
 
     f = Σ ρ z z' / Σ ρ²,       z = e / √C_rr,     ρ = C_rr' / √(C_rr C_r'r'),
 
-over such pairs of rows is how much wider the policy's covariance has to be than the process says.
+over such pairs of rows is how much wider the policy's covariance has to be than the process says. To that a fifth of the
+delete-a-fold jackknife is added, `⅕ (K - 1)/K Σ_k (m_k - m̄)(m_k - m̄)ᵀ` of the means m_k without each fold, as for policies
+that are linear in their parameters (`fitting.calibration`).
 
 References
 ----------
@@ -34,6 +36,9 @@ from unconstrain.gaussian_process.rows import Rows
 NARROWEST, WIDEST = 1.0, 1e4
 """Between which covariances are widened."""
 
+SHARE_OF_SPREAD = 0.2
+"""Share of the jackknife that is added."""
+
 LEAST_TOLD = 0.2
 """Sum of squared correlations below which products of errors are noise, and say nothing of the covariance."""
 
@@ -52,6 +57,28 @@ class HeldOut:
 
     processes: dict[int, Process]
     widening: float
+
+    def widen(self, process: Process) -> Process:
+        """Make the covariance of the process of all folds as wide as what was held out says.
+
+        Parameters
+        ----------
+        process : Process
+            Of all folds.
+
+        Returns
+        -------
+        Process
+            With the same mean.
+        """
+        K = len(self.processes)
+        if K < 2:
+            return replace(process, widening=self.widening)
+        coefficients = np.stack([each.coefficients for each in self.processes.values()], axis=1)
+        apart = coefficients - coefficients.mean(axis=1, keepdims=True)
+        return replace(
+            process, widening=self.widening, apart=np.sqrt(SHARE_OF_SPREAD * (K - 1) / K) * apart
+        )
 
 
 def hold_out_exactly(process: Process, rows: Rows, fold: np.ndarray, follows: np.ndarray) -> HeldOut:

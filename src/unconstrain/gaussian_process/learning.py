@@ -221,8 +221,7 @@ def learn_published(problem: Problem, risk: str) -> Learnt:
         Without a belief.
     """
     conditioned, evidence = _condition_published(problem, risk)
-    widening = conditioned.hold_out().widening
-    return Learnt(replace(conditioned.process, widening=widening), evidence)
+    return Learnt(conditioned.hold_out().widen(conditioned.process), evidence)
 
 
 def learn_adaptively(
@@ -320,11 +319,10 @@ def _pass_on(problem: Problem, model: Any, name: str, belief: Belief, first: Any
 
 def _compare(problem: Problem, model: Any, ends: dict[str, End]) -> Learnt:
     """Choose by held-out likelihood."""
-    likelihoods, widenings = {}, {}
-    for name, end in ends.items():
-        held = end.conditioned.hold_out()
-        widenings[name] = held.widening
-        likelihoods[name] = _held_out_likelihood(problem, model, end, held.processes)
+    held = {name: end.conditioned.hold_out() for name, end in ends.items()}
+    likelihoods = {
+        name: _held_out_likelihood(problem, model, end, held[name].processes) for name, end in ends.items()
+    }
     best = ends[FREE]
     for end in ends.values():
         n_samples = end.tally.n_samples
@@ -334,7 +332,7 @@ def _compare(problem: Problem, model: Any, ends: dict[str, End]) -> Learnt:
         if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE:
             best = end
     likelihoods = dict(sorted(likelihoods.items(), key=lambda item: item[0] != best.name))
-    process = replace(best.conditioned.process, widening=widenings[best.name])
+    process = held[best.name].widen(best.conditioned.process)
     history = tuple(each for end in ends.values() for each in end.history)
     belief = replace(best.belief, w=process.without_variances())
     regression = ends[FREE].conditioned.process.without_variances()

@@ -60,7 +60,10 @@ class Process:
     left : ndarray of shape (P, P), optional
         C; zero where rows were not approximated.
     widening : float
-        What the covariance is multiplied by; see `calibration`.
+        What the covariance is multiplied by; see `held_out`.
+    apart : ndarray of shape (R, K), optional
+        By what coefficients without each of K folds lie apart, scaled: `k(x)ᵀ` times these, squared, is what folds add to
+        the covariance.
     """
 
     kernel: Any
@@ -73,6 +76,7 @@ class Process:
     whitener: np.ndarray | None = None
     left: np.ndarray | None = None
     widening: float = 1.0
+    apart: np.ndarray | None = None
 
     @property
     def n_actions(self) -> int:
@@ -122,7 +126,8 @@ class Process:
         covariance = np.empty((len(X), d, d))
         for rows in self._blocks(len(X)):
             seen = every_direction(self.scaling(X[rows]), d)
-            features = (self.kernel(seen, self.pairs) @ self.whitener).reshape(-1, d, self.whitener.shape[1])
+            k = self.kernel(seen, self.pairs)
+            features = (k @ self.whitener).reshape(-1, d, self.whitener.shape[1])
             prior = self._prior(seen, d)
             covariance[rows] = prior - features @ features.swapaxes(1, 2)
             if self.left is not None:
@@ -130,11 +135,15 @@ class Process:
             least = ROUNDING * np.einsum("njj->nj", prior)
             axis = np.arange(d)
             covariance[rows, axis, axis] = np.maximum(covariance[rows, axis, axis], least)
-        return self.widening * self.size**2 * covariance
+            covariance[rows] *= self.widening
+            if self.apart is not None:
+                spread = (k @ self.apart).reshape(-1, d, self.apart.shape[1])
+                covariance[rows] += spread @ spread.swapaxes(1, 2)
+        return self.size**2 * covariance
 
     def without_variances(self) -> "Process":
         """Return a process that predicts, but does not know how sure it is: a small file."""
-        return replace(self, whitener=None, left=None)
+        return replace(self, whitener=None, left=None, apart=None)
 
     def _prior(self, seen: np.ndarray, d: int) -> np.ndarray:
         """Compute the prior's covariance at each state, (N, d, d)."""

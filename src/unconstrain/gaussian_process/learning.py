@@ -2,7 +2,8 @@
 
 The published risks are observed once: the likeliest kernel is found, and conditioned on all rows. Which samples were
 free is inferred on few inducing rows first, whose features are a model like any other (`fitting.inference`): it starts
-from both ends and lowers the noise. From where "all free" and the likeliest of its other runs end, each further pass
+from both ends and lowers the noise. From where "all free" and the likeliest of its other runs end, and of few samples from the process of the inconsistency,
+each further pass
 
 1. infers which samples were free by the process as it is, and what they say of the policy (`fitting.contact`),
 2. finds kernel and noise anew, in the first of these passes and in the third,
@@ -20,7 +21,9 @@ from typing import Any
 import numpy as np
 
 from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
+from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.inference import (
     DECISIVE,
     FREE,
@@ -53,6 +56,11 @@ SETTLED = 1e-3
 
 LEAST_LEFT = 0.2
 """Share of the observed numbers that is taken to be left for the noise, at least."""
+
+FROM_PROCESS = "inferred, from the inconsistency's process"
+FEW = 1000
+"""Samples up to which passes begin with the process of the inconsistency as well: where movements are few it may be right
+where nothing that inducing features can say is."""
 
 ENOUGH = 1e-2
 """Difference in log-likelihood per sample by which two runs have ended apart."""
@@ -243,9 +251,9 @@ def learn_adaptively(
     Learnt
         With the belief.
     """
-    samples = problem.samples
+    samples, d = problem.samples, problem.samples.actions.shape[1]
     evidence = problem.find_evidence(observe("inconsistency", samples.actions, samples.projections))
-    features = place_features(evidence, samples.states, samples.actions.shape[1], INFERRING)
+    features = place_features(evidence, samples.states, d, INFERRING)
     inducing, blank = make_inference(features)
     inference = Inference(blank)
     while (wanted := inference.next_pass()) is not None:
@@ -256,7 +264,14 @@ def learn_adaptively(
     found = max((runs[name] for name in INFERRED if name in runs), key=lambda run: run.log_likelihood)
     if all(abs(found.log_likelihood - runs[name].log_likelihood) > ENOUGH * len(samples.states) for name in wanted_runs):
         wanted_runs.add(found.name)
-    starts = [(name, run.end, inducing) for name, run in runs.items() if name in wanted_runs]
+    starts: list[tuple[str, Belief, Any]] = [
+        (name, run.end, inducing) for name, run in runs.items() if name in wanted_runs
+    ]
+    if len(samples.states) <= FEW:
+        conditioned, evidence = _condition_published(problem, "inconsistency")
+        noise = Noise(max(evidence.noise * evidence.size**2, problem.floor))
+        drift = Drift() if d > 1 else None
+        starts.append((FROM_PROCESS, Belief(conditioned.process, noise, Chain(), drift), model))
     ends = {name: _pass_on(problem, model, name, start, first) for name, start, first in starts}
     return _compare(problem, model, ends)
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         GaussianProcessPolicy,
         LocallyLinearPolicy,
         ParametricPolicy,
+        RegressorPolicy,
         load_compiled,
         load_policy,
     )
@@ -60,6 +61,7 @@ __all__ = [
     "PotentialFeatures",
     "Preparation",
     "Recordings",
+    "RegressorPolicy",
     "constraints",
     "distributed",
     "errors",
@@ -99,6 +101,7 @@ _HOMES = {
         "GaussianProcessPolicy",
         "LocallyLinearPolicy",
         "ParametricPolicy",
+        "RegressorPolicy",
         "load_compiled",
         "load_policy",
     ),

@@ -1,8 +1,9 @@
 """Choosing among policies by what they predict of episodes held out, which needs nothing but recordings.
 
-Every candidate is fitted once, its samples added up by fold. Leaving a fold out is a subtraction of its moments, so
-the solution without fold k, with λ chosen anew among the other folds, costs no second pass over the data. Its
-predictions for the episodes of fold k are compared with their actions, and all folds' errors are pooled.
+Every candidate that is linear in its parameters is fitted once, its samples added up by fold. Leaving a fold out is a
+subtraction of its moments, so the solution without fold k, with λ chosen anew among the other folds, costs no
+second pass over the data; candidates of other kinds are fitted anew without each fold. The predictions for the
+episodes of fold k are compared with their actions, and all folds' errors are pooled.
 
 All candidates are judged by one measure (`judging`): which samples were free is taken, fold by fold, from the one whose
 held-out likelihood is largest among those that infer it. By their inconsistency alone, candidates that learn only along
@@ -38,7 +39,10 @@ from unconstrain.constraints.nullspace import in_metric
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
-from unconstrain.fitting.solve import splits
+from unconstrain.fitting.completion import ByBelief
+from unconstrain.fitting.contact import judge
+from unconstrain.fitting.in_space import in_units
+from unconstrain.fitting.solve import EpisodeFolds, splits
 from unconstrain.judging import (
     CORRECTED,
     INCONSISTENCY,
@@ -49,14 +53,19 @@ from unconstrain.judging import (
 )
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
+from unconstrain.policies.linear import LinearPolicy
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
+from unconstrain.samples import Samples
 from unconstrain.spaces import Space
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
 MOST_CENTERS = 50
 COARSE_KNOTS = 15
+
+LEAST_SHARE = 1e-6
+"""Of the variance found by a fit: as much is left to that of what was held out."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +84,9 @@ class Row:
     explained : float
         Share of held-out motion explained, as shown: `1 - Σ [γ ‖u - p‖² + (1 - γ) (r - û·p)²] / Σ r²`.
     alpha : float
-        Weight decay λ, as chosen on all the data.
+        Weight decay λ, as chosen on all the data; NaN where there is none.
     n_parameters : int
-        Of all actions together, of each local model.
+        Of all actions together, of each local model; 0 where a policy is not linear in any.
     seconds : float
         To fit and to hold out.
     problem : str, optional
@@ -390,8 +399,8 @@ def _try(
         return Row(name, seconds=time.perf_counter() - start, problem=sentence), None
     row = Row(
         name,
-        alpha=found.policy.alpha_,
-        n_parameters=found.policy.solution_.w.size,
+        alpha=getattr(found.policy, "alpha_", np.nan),
+        n_parameters=np.size(found.policy.solution_.w) if isinstance(found.policy, LinearPolicy) else 0,
         seconds=time.perf_counter() - start,
         log_likelihood=found.log_likelihood,
     )
@@ -461,6 +470,8 @@ def _hold_out(
     policy: Policy, X: np.ndarray, U: Any, groups: np.ndarray | None, projections: np.ndarray | None
 ) -> _HeldOut:
     """Fit a policy to all samples, and judge each sample by parameters that were solved without its fold."""
+    if not isinstance(policy, LinearPolicy):
+        return _hold_out_by_refitting(policy, X, U, groups, projections)
     if policy.alpha != "cv":  # `fit` does not get to see it
         check_number(policy.alpha, "alpha", positive=False)
     fitted = clone(policy).set_params(alpha="cv").fit(X, U, groups=groups, projections=projections)
@@ -504,13 +515,42 @@ def _hold_out(
     return _HeldOut(fitted, predictions, fold, free, belief.noise.action, likelihood)
 
 
+def _hold_out_by_refitting(
+    policy: Policy, X: np.ndarray, U: Any, groups: np.ndarray | None, projections: np.ndarray | None
+) -> _HeldOut:
+    """Fit a policy anew without each fold, where no sums are kept that it could be solved from."""
+    fold = EpisodeFolds().assign(groups, len(X))
+    actions = check_actions(U)
+    predictions = np.empty_like(actions)
+    for k in np.unique(fold).tolist():
+        rest = fold != k
+        left = clone(policy).fit(
+            X[rest],
+            np.asarray(U)[rest],
+            groups=None if groups is None else groups[rest],
+            projections=None if projections is None else projections[rest],
+        )
+        predictions[~rest] = check_actions(left.predict(X[~rest]), "predictions")
+    fitted = clone(policy).fit(X, U, groups=groups, projections=projections)
+    belief = fitted.solution_.belief
+    if belief is None:
+        return _HeldOut(fitted, predictions, fold)
+    samples = in_units(fitted.model_.scale, Samples(X, actions, groups, projections))
+    rule = ByBelief(samples, belief, LEAST_SHARE * belief.noise.action)
+    P = fitted.scaled(predictions)
+    settled = rule.settle(P)
+    return _HeldOut(
+        fitted, predictions, fold, judge(P, settled, samples).free, settled.noise.action, rule.judge(P)
+    )
+
+
 def _cells(row: Row) -> tuple[str, ...]:
     return (
         row.name,
         f"{row.error:.4g} ± {row.standard_error:.1g}",
         f"{row.explained:.6f}",
-        f"{row.alpha:.2g}",
-        str(row.n_parameters),
+        "" if np.isnan(row.alpha) else f"{row.alpha:.2g}",
+        str(row.n_parameters or ""),
         f"{row.seconds:.2f}",
     )
 

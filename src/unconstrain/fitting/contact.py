@@ -161,6 +161,15 @@ class Found(NamedTuple):
     tally: Tally
     residual: Noise | None = None
 
+    @property
+    def gradient(self) -> Floats:
+        """The gradient of expected log-likelihoods by the predictions, in units of what a free sample says, (N, d)."""
+        return _expected_gradient(self._learnt_by, self.taken_whole)
+
+    @property
+    def _learnt_by(self) -> Views:
+        return self.views if self.residual is None else self.views.under(self.residual)
+
     def expand(self) -> Expanded:
         """Expand expected log-likelihoods about the predictions, in units of what a free sample says.
 
@@ -170,16 +179,16 @@ class Found(NamedTuple):
             Of N samples.
         """
         free = self.taken_whole
-        views = self.views if self.residual is None else self.views.under(self.residual)
+        views = self._learnt_by
         unit, whole, bent, sphere = views.noise.action, views.whole, views.constrained, views.sphere
         not_free = 1 - free
         along = free * (unit * whole.information - 1)
         towards = not_free * unit / bent.variance
         # Where noise is as large as the sphere, an action tells something in every direction.
         blunt = towards * 0.25 * bent.variance / (bent.variance + sphere.radius**2)
-        gradient = unit * (free[:, None] * whole.gradient + not_free[:, None] * bent.gradient)
         error = free * (whole.across + unit / whole.variance * whole.along) + towards * bent.square
         parts = (free + blunt, along, towards, sphere.ahead, sphere.normal)
+        gradient = _expected_gradient(views, free)
         return Expanded.of(views.P, gradient, error, *parts, known=self.known, projections=self.projections)
 
     def judge(self, scale: float, variance: float | None = None) -> Expanded:
@@ -329,6 +338,11 @@ def episode_starts(samples: Samples) -> NDArray[np.bool_]:
     if groups is not None:
         starts[1:] = groups[1:] != groups[:-1]
     return starts
+
+
+def _expected_gradient(views: Views, free: Floats) -> Floats:
+    gamma = free[:, None]
+    return views.noise.action * (gamma * views.whole.gradient + (1 - gamma) * views.constrained.gradient)
 
 
 def _squares(views: Views, free: Floats, omega: Floats) -> Squares:

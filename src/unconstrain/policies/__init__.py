@@ -4,6 +4,7 @@ from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.gaussian_process import GaussianProcessPolicy
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
+from unconstrain.policies.regressor import RegressorPolicy
 from unconstrain.policies.saving import load_policy
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "GaussianProcessPolicy",
     "LocallyLinearPolicy",
     "ParametricPolicy",
+    "RegressorPolicy",
     "load_compiled",
     "load_policy",
 ]

@@ -42,9 +42,10 @@ def load_policy(path: str | PathLike[str], *, trusted: Iterable[Any] = ()) -> Po
     ----------
     path : path
         The file.
-    trusted : classes and functions, optional
+    trusted : classes and functions, or str, optional
         Those of your own that the policy holds: a transformer, a function given to one. The file has only their
-        names, so give the classes and functions themselves.
+        names, so give the classes and functions themselves. What a regressor of a `RegressorPolicy` is made of, beside
+        what skops knows to be harmless, is given by name, as the error says that asks for it.
 
     Returns
     -------

@@ -14,6 +14,7 @@ from typing import Any
 
 _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.policies.parametric": ("ParametricPolicy",),
+    "unconstrain.policies.regressor": ("RegressorPolicy",),
     "unconstrain.policies.locally_linear": ("LocallyLinearPolicy",),
     "unconstrain.policies.gaussian_process": ("GaussianProcessPolicy",),
     "unconstrain.gaussian_process.kernels": ("CurlFree", "CurlFreeQuadratic", "Separable"),
@@ -38,6 +39,7 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.fitting.inference": ("Inference", "Run"),
     "unconstrain.fitting.noise": ("Noise", "Squares"),
     "unconstrain.fitting.region": ("Region",),
+    "unconstrain.fitting.regression": ("Regressed", "Regression", "Trend"),
     "unconstrain.constraints.learnt.constant": ("ConstantConstraint",),
     "unconstrain.constraints.learnt.feature": ("FeatureConstraint",),
     "unconstrain.constraints.learnt.jacobian": ("JacobianFeatures",),

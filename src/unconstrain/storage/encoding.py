@@ -15,6 +15,7 @@
 | NumPy's `RandomState`, `Generator`        | `{"random": [kind, state]}`                       |
 | object of a class                         | `{"object": ["unconstrain.NormalizedRBF", state]}`|
 | a function or class of the user's own     | `{"trusted": "module:name"}`                      |
+| a regressor of anyone's, by skops         | `{"skops": name of the bytes}`                    |
 
 An object is restored from its state without its constructor. Its class comes from the closed list of
 `unconstrain.storage.classes`, or from what the caller trusts; a name that is in neither is refused.
@@ -31,6 +32,7 @@ import numpy as np
 from unconstrain.errors import UnconstrainError
 from unconstrain.storage.archive import is_storable
 from unconstrain.storage.classes import check_restored, class_of, name_of, without_circumstances
+from unconstrain.storage.estimators import dump, is_foreign_regressor, list_untrusted, restore
 
 DEEPEST = 60
 """Containers and objects within each other, at most."""
@@ -109,8 +111,8 @@ def decode(tree: Any, arrays: dict[str, np.ndarray], trusted: Iterable[Any] = ()
     tree : JSON value
     arrays : dict of str to ndarray
         As `encode` returned them. Arrays are not copied.
-    trusted : classes and functions, optional
-        What the object may hold besides the listed classes.
+    trusted : classes and functions, or str, optional
+        What the object may hold besides the listed classes; parts of regressors also by name, "package.module.Class".
 
     Returns
     -------
@@ -123,15 +125,23 @@ def decode(tree: Any, arrays: dict[str, np.ndarray], trusted: Iterable[Any] = ()
     Exception
         The tree is not one that `encode` returned; there is no telling what is raised then.
     """
-    known = {qualified_name(each): each for each in trusted}
+    given = list(trusted)
+    known = {qualified_name(each): each for each in given if not isinstance(each, str)}
+    named = {each for each in given if isinstance(each, str)} | {each.replace(":", ".") for each in known}
     unknown = [
         name
         for name, listable in dict.fromkeys(_names(tree))
         if not (listable and class_of(name) is not None) and _match(name, known) is None
     ]
+    unknown += [
+        name
+        for content in dict.fromkeys(_regressors(tree))
+        for name in list_untrusted(arrays[content])
+        if name not in named
+    ]
     if unknown:
-        raise UntrustedError(unknown)
-    return _Decoder(arrays, known).decoded(tree)
+        raise UntrustedError(list(dict.fromkeys(unknown)))
+    return _Decoder(arrays, known, named).decoded(tree)
 
 
 def qualified_name(what: Any) -> str:
@@ -186,6 +196,19 @@ def _names(tree: Any) -> Iterator[tuple[str, bool]]:
                 yield named[0], True
 
 
+def _regressors(tree: Any) -> Iterator[str]:
+    """Walk over the names of arrays that hold regressors."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, list):
+            waiting.extend(node)
+        elif isinstance(node, dict):
+            waiting.extend(node.values())
+            if isinstance(node.get("skops"), str):
+                yield node["skops"]
+
+
 class _Encoder:
     """Collects arrays, and classes and functions that are not listed, while a tree is built."""
 
@@ -193,6 +216,7 @@ class _Encoder:
         self.arrays: dict[str, np.ndarray] = {}
         self.foreign: dict[str, Any] = {}
         self._named: dict[int, str] = {}
+        self._dumped: dict[int, np.ndarray] = {}
 
     def encoded(self, value: Any, where: str, depth: int = 0) -> Any:
         if depth > DEEPEST:
@@ -295,8 +319,12 @@ class _Encoder:
         by_state = cls.__reduce__ is object.__reduce__ and cls.__reduce_ex__ is object.__reduce_ex__
         if not (by_state and hasattr(value, "__dict__")):
             raise _unsavable_type(where, value)
-        state = value.__getstate__()
         listed = name_of(cls)
+        if listed is None and is_foreign_regressor(value):
+            if id(value) not in self._dumped:
+                self._dumped[id(value)] = dump(value)
+            return {"skops": self.of_array(self._dumped[id(value)], where, depth)["array"]}
+        state = value.__getstate__()
         if listed is not None:
             state = without_circumstances(listed, state)
         if isinstance(state, dict):
@@ -327,8 +355,8 @@ _ENCODERS_OF_KINDS: list[tuple[Any, _Encode]] = [
 
 
 class _Decoder:
-    def __init__(self, arrays: dict[str, np.ndarray], known: dict[str, Any]) -> None:
-        self.arrays, self.known = arrays, known
+    def __init__(self, arrays: dict[str, np.ndarray], known: dict[str, Any], named: set[str]) -> None:
+        self.arrays, self.known, self.named = arrays, known, named
 
     def decoded(self, node: Any) -> Any:
         if isinstance(node, list):
@@ -393,6 +421,9 @@ class _Decoder:
         random.set_state(state)
         return random
 
+    def of_regressor(self, content: str) -> Any:
+        return restore(self.arrays[content], self.named)
+
     def of_trusted(self, content: str) -> Any:
         return _match(content, self.known)
 
@@ -436,6 +467,7 @@ _DECODERS: dict[str, Callable[[_Decoder, Any], Any]] = {
     "dtype": _Decoder.of_dtype,
     "spline": _Decoder.of_spline,
     "random": _Decoder.of_random,
+    "skops": _Decoder.of_regressor,
     "trusted": _Decoder.of_trusted,
     "object": _Decoder.of_object,
 }

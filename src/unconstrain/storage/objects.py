@@ -85,10 +85,12 @@ def load_object(
             raise failure
     except UntrustedError as error:
         shown = [name.replace(":", ".") for name in error.names]
-        own = ", ".join(name.rpartition(".")[2] for name in shown)
+        # What a regressor is made of is often hidden deep in its package, and so is trusted by name.
+        own = [f'"{name}"' if ":" not in name else name.rpartition(":")[2] for name in error.names]
+        classes = "import what it names and " if any(":" in name for name in error.names) else ""
         raise ArchiveError(
             f"{os.fspath(path)} holds {', '.join(shown)}, which unconstrain does not know: if you trust the file's "
-            f"source, import what it names and load it with {loader}(path, trusted=[{own}])"
+            f"source, {classes}load it with {loader}(path, trusted=[{', '.join(own)}])"
         ) from None
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())

@@ -5,17 +5,17 @@ Without the rows I of a fold the posterior is that of the others, which costs no
 
     C_I = (G_II)⁻¹,        e_I = C_I α_I,        α' = α - G_{·I} C_I α_I,
 
-are the covariance of the fold's rows given the others, noise included, their errors, and the coefficients of the process
-without them, zero at I. On inducing rows the moments of the fold are subtracted.
+are the covariance of the fold's rows given the others, noise included, their errors, and the coefficients of the
+process without them, zero at I. On inducing rows the moments of the fold are subtracted.
 
 *Calibration.* Noise differs from one sample to the next, but a policy that is wrong at one sample is as wrong at the
 next. So whatever the noise, products of errors of samples that follow each other have their covariance as the mean, and
 
     f = Σ ρ z z' / Σ ρ²,       z = e / √C_rr,     ρ = C_rr' / √(C_rr C_r'r'),
 
-over such pairs of rows is how much wider the policy's covariance has to be than the process says. To that a fifth of the
-delete-a-fold jackknife is added, `⅕ (K - 1)/K Σ_k (m_k - m̄)(m_k - m̄)ᵀ` of the means m_k without each fold, as for policies
-that are linear in their parameters (`fitting.calibration`).
+over such pairs of rows is how much wider the policy's covariance has to be than the process says. To that a fifth of
+the delete-a-fold jackknife is added, `⅕ (K - 1)/K Σ_k (m_k - m̄)(m_k - m̄)ᵀ` of the means m_k without each fold, as
+for policies that are linear in their parameters (`fitting.calibration`).
 
 References
 ----------
@@ -76,9 +76,7 @@ class HeldOut:
             return replace(process, widening=self.widening)
         coefficients = np.stack([each.coefficients for each in self.processes.values()], axis=1)
         apart = coefficients - coefficients.mean(axis=1, keepdims=True)
-        return replace(
-            process, widening=self.widening, apart=np.sqrt(SHARE_OF_SPREAD * (K - 1) / K) * apart
-        )
+        return replace(process, widening=self.widening, apart=np.sqrt(SHARE_OF_SPREAD * (K - 1) / K) * apart)
 
 
 def hold_out_exactly(process: Process, rows: Rows, fold: np.ndarray, follows: np.ndarray) -> HeldOut:

@@ -1,9 +1,12 @@
 """A Gaussian process on few rows: features in which its policies are linear.
 
-With inducing rows s of covariance `K = V diag(v) Vᵀ`, the features `Φ(x)ᵀq = Bᵀ k(s, (x, q))`, `B = V diag(v)^(-1/2)`, have
-the covariance `ΦᵀΦ ≈ k` (Nyström), so parameters with the prior N(0, I) are the process. Inference of contact runs on
-them as on any other model that is linear in its parameters, and sums of moments condition more rows than fit into one
-matrix.
+With inducing rows s of covariance `K = V diag(v) Vᵀ`, the features
+
+    Φ(x)ᵀq = Bᵀ k(s, (x, q)),        B = V diag(v)^(-1/2),
+
+have the covariance `ΦᵀΦ ≈ k` (Nyström), so parameters with the prior N(0, I) are the process. Inference of contact
+runs on them as on any other model that is linear in its parameters, and sums of moments condition more rows than fit
+into one matrix.
 
 References
 ----------

@@ -5,11 +5,11 @@ a direction. Its inputs are rows `(x, q)`, the state's columns first, so any `Ga
 observations along directions as it does from others: sums, products and powers of kernels, their hyperparameters and
 gradients are scikit-learn's own.
 
-| kernel                | cov(qᵀπ(x), q'ᵀπ(x'))                                      | policies                           |
-| --------------------- | ---------------------------------------------------------- | ---------------------------------- |
-| `Separable(k)`        | `qᵀq' k(x, x')`                                            | each action like any other         |
-| `CurlFree(ℓ)`         | `qᵀ (I - Δ Δᵀ / ℓ²) q' exp(-‖Δ‖² / 2ℓ²)`,  `Δ = x - x'`     | gradients of a smooth potential    |
-| `CurlFreeQuadratic()` | `(qᵀq') (xᵀx') + (qᵀx') (xᵀq')`                            | gradients of a quadratic potential |
+| kernel                | cov(qᵀπ(x), q'ᵀπ(x')), `Δ = x - x'`           | policies                           |
+| --------------------- | --------------------------------------------- | ---------------------------------- |
+| `Separable(k)`        | `qᵀq' k(x, x')`                               | each action like any other         |
+| `CurlFree(ℓ)`         | `qᵀ (I - Δ Δᵀ / ℓ²) q' exp(-‖Δ‖² / 2ℓ²)`      | gradients of a smooth potential    |
+| `CurlFreeQuadratic()` | `(qᵀq') (xᵀx') + (qᵀx') (xᵀq')`               | gradients of a quadratic potential |
 
 The last two are `∂²k / ∂x ∂x'` seen along q and q', of a kernel k of potentials: `ℓ² exp(-‖x - x'‖² / 2ℓ²)` and
 `(xᵀx')² / 2`.
@@ -84,11 +84,7 @@ class Separable(Kernel):
         return self.kernel.bounds
 
     def __eq__(self, other: object) -> bool:
-        return (
-            type(self) is type(other)
-            and self.kernel == other.kernel
-            and self.n_actions == other.n_actions
-        )
+        return type(self) is type(other) and self.kernel == other.kernel and self.n_actions == other.n_actions
 
     def __call__(self, X: Array, Y: Array | None = None, eval_gradient: bool = False) -> Any:
         """Compute covariances of rows (N, n + d) with others, and their gradient by `theta`."""

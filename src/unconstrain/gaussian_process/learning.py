@@ -2,8 +2,8 @@
 
 The published risks are observed once: the likeliest kernel is found, and conditioned on all rows. Which samples were
 free is inferred on few inducing rows first, whose features are a model like any other (`fitting.inference`): it starts
-from both ends and lowers the noise. From where "all free" and the likeliest of its other runs end, and of few samples from the process of the inconsistency,
-each further pass
+from both ends and lowers the noise. From where "all free" and the likeliest of its other runs end, and of few samples
+from the process of the inconsistency, each further pass
 
 1. infers which samples were free by the process as it is, and what they say of the policy (`fitting.contact`),
 2. finds kernel and noise anew, in the first of these passes and in the third,
@@ -59,8 +59,8 @@ LEAST_LEFT = 0.2
 
 FROM_PROCESS = "inferred, from the inconsistency's process"
 FEW = 1000
-"""Samples up to which passes begin with the process of the inconsistency as well: where movements are few it may be right
-where nothing that inducing features can say is."""
+"""Samples up to which passes begin with the process of the inconsistency as well: where movements are few it may be
+right where nothing that inducing features can say is."""
 
 ENOUGH = 1e-2
 """Difference in log-likelihood per sample by which two runs have ended apart."""
@@ -262,7 +262,8 @@ def learn_adaptively(
     runs = {run.name: run for run in inference.runs}
     wanted_runs = {FREE, next(iter(inference.likelihoods))}
     found = max((runs[name] for name in INFERRED if name in runs), key=lambda run: run.log_likelihood)
-    if all(abs(found.log_likelihood - runs[name].log_likelihood) > ENOUGH * len(samples.states) for name in wanted_runs):
+    apart = min(abs(found.log_likelihood - runs[name].log_likelihood) for name in wanted_runs)
+    if apart > ENOUGH * len(samples.states):
         wanted_runs.add(found.name)
     starts: list[tuple[str, Belief, Any]] = [
         (name, run.end, inducing) for name, run in runs.items() if name in wanted_runs
@@ -354,9 +355,7 @@ def _compare(problem: Problem, model: Any, ends: dict[str, End]) -> Learnt:
     return Learnt(process, best.evidence, belief, best.tally, likelihoods, history, regression)
 
 
-def _held_out_likelihood(
-    problem: Problem, model: Any, end: End, processes: Mapping[int, Process]
-) -> float:
+def _held_out_likelihood(problem: Problem, model: Any, end: End, processes: Mapping[int, Process]) -> float:
     """Compute the log-likelihood of a sample that was held out, under the noise of what was held out."""
     belief = end.belief
     if not processes:

@@ -5,10 +5,10 @@ With a prior of covariance K and rows observed through noise of variance σ² (`
     E qᵀπ(x)   = k(x, q)ᵀ α,                 α = (K + σ²I)⁻¹ t,
     cov        = k(·,·) - kᵀ B Bᵀ k + kᵀ B C Bᵀ k.
 
-*Exactly*, k are covariances with all rows, B Bᵀ = (K + σ²I)⁻¹ and C = 0. *On inducing rows* of which there are few, k are
-covariances with those, B Bᵀ = K⁻¹ of theirs and C = σ² (σ²I + Σ Φ A Φᵀ)⁻¹ with the features Φ = Bᵀk, to which the prior
-is conditioned: the deterministic training conditional. The middle term is what inducing rows explain of the prior, so
-far from all of them the variance is the prior's.
+*Exactly*, k are covariances with all rows, B Bᵀ = (K + σ²I)⁻¹ and C = 0. *On inducing rows* of which there are few, k
+are covariances with those, B Bᵀ = K⁻¹ of theirs and C = σ² (σ²I + Σ Φ A Φᵀ)⁻¹ with the features Φ = Bᵀk, to which the
+prior is conditioned: the deterministic training conditional. The middle term is what inducing rows explain of the
+prior, so far from all of them the variance is the prior's.
 
 References
 ----------
@@ -62,8 +62,8 @@ class Process:
     widening : float
         What the covariance is multiplied by; see `held_out`.
     apart : ndarray of shape (R, K), optional
-        By what coefficients without each of K folds lie apart, scaled: `k(x)ᵀ` times these, squared, is what folds add to
-        the covariance.
+        By what coefficients without each of K folds lie apart, scaled: `k(x)ᵀ` times these, squared, is what folds
+        add to the covariance.
     """
 
     kernel: Any

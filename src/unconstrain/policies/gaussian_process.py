@@ -38,31 +38,34 @@ FIXED_DECAY = 1e-4
 
 
 class GaussianProcessPolicy(Policy):
-    """The unconstrained policy behind constrained movements as a Gaussian process, `qᵀπ(x) ~ GP(0, k((x, q), (x', q')))`.
+    """The unconstrained policy behind constrained movements, as a Gaussian process `qᵀπ(x) ~ GP(0, k)`.
 
-    It learns from what each sample shows along directions: a free sample in all d, a constrained one along its motion, one
-    whose projection is known behind that. Kernel, widths, amplitudes and noise are those of largest marginal likelihood,
-    found from up to 500 observed numbers that lie far apart. Up to 4,000 numbers the posterior is exact, beyond it rests
-    on 2,100 inducing ones, up to 10^5 samples; `approximation_` says which. There is no `partial_fit`.
+    It learns from what each sample shows along directions: a free sample in all d, a constrained one along its
+    motion, one whose projection is known behind that. Kernel, widths, amplitudes and noise are those of largest
+    marginal likelihood, found from up to 500 observed numbers that lie far apart. Up to 4,000 numbers the posterior
+    is exact, beyond it rests on 2,100 inducing ones, up to 10^5 samples; `approximation_` says which. There is no
+    `partial_fit`.
 
     Parameters
     ----------
     kernel : "auto" or Kernel
-        "auto" chooses by marginal likelihood among a smooth policy about a linear one, the same with a cubic polynomial,
-        and, where each action belongs to a state, the gradient of a smooth potential about a quadratic one. Or a kernel of
-        pairs (x, q) made of `uc.kernels` (`Separable`, `CurlFree`, `CurlFreeQuadratic`) by sums and products, or any
-        kernel of scikit-learn on states, which all actions then share. It sees standardised states, and actions in units of
-        their root mean square; its hyperparameters are where the search starts. The noise is found beside it.
+        "auto" chooses by marginal likelihood among a smooth policy about a linear one, the same with a cubic
+        polynomial, and, where each action belongs to a state, the gradient of a smooth potential about a quadratic
+        one. Or a kernel of pairs (x, q) made of `uc.kernels` (`Separable`, `CurlFree`, `CurlFreeQuadratic`) by sums
+        and products, or any kernel of scikit-learn on states, which all actions then share. It sees standardised
+        states, and actions in units of their root mean square; its hyperparameters are where the search starts. The
+        noise is found beside it.
     risk : {"adaptive", "inconsistency", "direct"}
         "adaptive" infers which samples were free and how noisy the actions are; see `fitting.contact`. "inconsistency"
-        learns from each action along its own direction, as published, which noise biases. Both make use of the projections
-        that are known. "direct" is ordinary regression.
+        learns from each action along its own direction, as published, which noise biases. Both make use of the
+        projections that are known. "direct" is ordinary regression.
     space : Space, optional
         What the states are; see `unconstrain.spaces`. By default what the demonstrations say, or numbers.
     scale : "auto" or array_like of shape (d,), optional
         What a length of one is along each action; see `ParametricPolicy`.
     noise : float, optional
-        Standard deviation of the actions' noise, in their unit, where it is known; the noise that is found is not below it.
+        Standard deviation of the actions' noise, in their unit, where it is known; the noise that is found is not
+        below it.
 
     Attributes
     ----------
@@ -170,8 +173,8 @@ class GaussianProcessPolicy(Policy):
         path : path
             Customarily it ends in ``.skops``. An existing file is replaced.
         resumable : bool
-            Keep also what tells how sure the policy is, of as many numbers as rows squared. Without it the policy that is
-            read back predicts only.
+            Keep also what tells how sure the policy is, of as many numbers as rows squared. Without it the policy
+            that is read back predicts only.
 
         Raises
         ------
@@ -188,7 +191,7 @@ class GaussianProcessPolicy(Policy):
 
     @property
     def kernel_(self) -> Any:
-        """The kernel with the hyperparameters found, for standardised states and actions in units of `usual_speed()`."""
+        """The kernel with its hyperparameters, for standardised states and actions in units of `usual_speed()`."""
         return self._process.kernel
 
     @property

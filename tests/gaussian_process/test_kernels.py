@@ -4,7 +4,7 @@ from sklearn.base import clone
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct
 
 import unconstrain as uc
-from unconstrain.gaussian_process.kernels import every_direction
+from unconstrain.gaussian_process.pairs import every_direction
 
 RNG = np.random.default_rng(0)
 SEPARABLE = ConstantKernel(0.5) * uc.kernels.Separable(RBF([1.0, 2.0]) + DotProduct(0.7), 3)

@@ -9,7 +9,8 @@ from unconstrain.fitting.global_model import GlobalModel
 from unconstrain.fitting.observation import observe
 from unconstrain.gaussian_process.held_out import hold_out_exactly
 from unconstrain.gaussian_process.inducing import make_features
-from unconstrain.gaussian_process.kernels import CurlFree, Separable, every_direction
+from unconstrain.gaussian_process.kernels import CurlFree, Separable
+from unconstrain.gaussian_process.pairs import every_direction
 from unconstrain.gaussian_process.process import condition
 from unconstrain.gaussian_process.rows import Rows
 

@@ -20,13 +20,8 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, Wh
 from unconstrain.errors import PolicyError
 from unconstrain.features.scaling import Scaling
 from unconstrain.fitting.observation import Observation
-from unconstrain.gaussian_process.kernels import (
-    CurlFree,
-    CurlFreeQuadratic,
-    Separable,
-    is_separable,
-    parts_of,
-)
+from unconstrain.gaussian_process.kernels import CurlFree, CurlFreeQuadratic, Separable
+from unconstrain.gaussian_process.parts import is_separable, parts_of
 from unconstrain.gaussian_process.rows import Rows
 from unconstrain.gaussian_process.spreading import choose_spread_out
 

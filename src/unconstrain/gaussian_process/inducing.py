@@ -20,7 +20,8 @@ import numpy as np
 
 from unconstrain.features.scaling import Scaling
 from unconstrain.fitting.moments import Moments
-from unconstrain.gaussian_process.kernels import every_direction, is_separable, pair
+from unconstrain.gaussian_process.pairs import every_direction, pair
+from unconstrain.gaussian_process.parts import is_separable
 from unconstrain.gaussian_process.process import Process
 
 ROUNDING = 1e-10

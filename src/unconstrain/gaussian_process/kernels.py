@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from sklearn.gaussian_process.kernels import Hyperparameter, Kernel
 
-from unconstrain.errors import PolicyError
+from unconstrain.gaussian_process.pairs import split
 
 Array = np.ndarray
 
@@ -36,7 +36,7 @@ class Separable(Kernel):
     Parameters
     ----------
     kernel : Kernel
-        k, any of scikit-learn's, over states.
+        Any of scikit-learn's over states, k.
     n_actions : int, optional
         How many of the last columns are the direction; by default half of them. A policy sets it.
 
@@ -55,7 +55,18 @@ class Separable(Kernel):
         self.n_actions = n_actions
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the parameters, those of k by the name `kernel__...`; see scikit-learn."""
+        """Return the parameters, those of k by the name `kernel__...`; see scikit-learn.
+
+        Parameters
+        ----------
+        deep : bool
+            Whether to return those of k.
+
+        Returns
+        -------
+        dict of str to object
+            Values by name.
+        """
         own = {"kernel": self.kernel, "n_actions": self.n_actions}
         if deep:
             own |= {f"kernel__{name}": value for name, value in self.kernel.get_params().items()}
@@ -87,7 +98,24 @@ class Separable(Kernel):
         return type(self) is type(other) and self.kernel == other.kernel and self.n_actions == other.n_actions
 
     def __call__(self, X: Array, Y: Array | None = None, eval_gradient: bool = False) -> Any:
-        """Compute covariances of rows (N, n + d) with others, and their gradient by `theta`."""
+        """Compute covariances of rows with others, and their gradient by `theta`.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n + d)
+            Rows (x, q).
+        Y : ndarray of shape (M, n + d), optional
+            Others; by default the same.
+        eval_gradient : bool
+            Whether to return the gradient too, with respect to `theta`.
+
+        Returns
+        -------
+        K : ndarray of shape (N, M)
+            Covariances.
+        gradient : ndarray of shape (N, N, p)
+            Where asked for.
+        """
         x, q = split(X, self.n_actions)
         y, p = (x, q) if Y is None else split(Y, self.n_actions)
         along = q @ p.T
@@ -97,12 +125,29 @@ class Separable(Kernel):
         return along * value, along[:, :, None] * gradient
 
     def diag(self, X: Array) -> Array:
-        """Compute the variances of rows (N, n + d)."""
+        """Compute the variances of rows.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n + d)
+            Rows (x, q).
+
+        Returns
+        -------
+        ndarray of shape (N,)
+            Variances.
+        """
         x, q = split(X, self.n_actions)
         return np.einsum("nd,nd->n", q, q) * self.kernel.diag(x)
 
     def is_stationary(self) -> bool:
-        """Return False: what a row varies by hangs on its direction."""
+        """Return False: what a row varies by hangs on its direction.
+
+        Returns
+        -------
+        bool
+            False.
+        """
         return False
 
     def __repr__(self) -> str:
@@ -117,7 +162,7 @@ class CurlFree(Kernel):
     Parameters
     ----------
     length_scale : float
-        ℓ, in the unit of the states.
+        Width ℓ, in the unit of the states.
     length_scale_bounds : pair of float, or "fixed"
         Between which it is searched.
     """
@@ -130,11 +175,28 @@ class CurlFree(Kernel):
 
     @property
     def hyperparameter_length_scale(self) -> Hyperparameter:
-        """ℓ, as scikit-learn sees it."""
+        """The width ℓ, as scikit-learn sees it."""
         return Hyperparameter("length_scale", "numeric", self.length_scale_bounds)
 
     def __call__(self, X: Array, Y: Array | None = None, eval_gradient: bool = False) -> Any:
-        """Compute covariances of rows (N, 2n) with others, and their gradient by `log ℓ`."""
+        """Compute covariances of rows with others, and their gradient by `log ℓ`.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, 2n)
+            Rows (x, q).
+        Y : ndarray of shape (M, 2n), optional
+            Others; by default the same.
+        eval_gradient : bool
+            Whether to return the gradient too, with respect to `theta`.
+
+        Returns
+        -------
+        K : ndarray of shape (N, M)
+            Covariances.
+        gradient : ndarray of shape (N, N, p)
+            Where asked for.
+        """
         x, q = split(X, None)
         y, p = (x, q) if Y is None else split(Y, None)
         square = _squared_distances(x, y) / self.length_scale**2
@@ -150,12 +212,29 @@ class CurlFree(Kernel):
         return value, (square * value + 2 * decay * turned)[:, :, None]
 
     def diag(self, X: Array) -> Array:
-        """Compute the variances of rows (N, 2n)."""
+        """Compute the variances of rows.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, 2n)
+            Rows (x, q).
+
+        Returns
+        -------
+        ndarray of shape (N,)
+            Variances.
+        """
         _, q = split(X, None)
         return np.einsum("nd,nd->n", q, q)
 
     def is_stationary(self) -> bool:
-        """Return False: what a row varies by hangs on its direction."""
+        """Return False: what a row varies by hangs on its direction.
+
+        Returns
+        -------
+        bool
+            False.
+        """
         return False
 
     def __repr__(self) -> str:
@@ -174,123 +253,58 @@ class CurlFreeQuadratic(Kernel):
         return {}
 
     def __call__(self, X: Array, Y: Array | None = None, eval_gradient: bool = False) -> Any:
-        """Compute covariances of rows (N, 2n) with others; the gradient has no columns."""
+        """Compute covariances of rows with others; the gradient has no columns.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, 2n)
+            Rows (x, q).
+        Y : ndarray of shape (M, 2n), optional
+            Others; by default the same.
+        eval_gradient : bool
+            Whether to return the gradient too, with respect to `theta`.
+
+        Returns
+        -------
+        K : ndarray of shape (N, M)
+            Covariances.
+        gradient : ndarray of shape (N, N, p)
+            Where asked for.
+        """
         x, q = split(X, None)
         y, p = (x, q) if Y is None else split(Y, None)
         value = (q @ p.T) * (x @ y.T) + (q @ y.T) * (x @ p.T)
         return (value, np.empty((*value.shape, 0))) if eval_gradient else value
 
     def diag(self, X: Array) -> Array:
-        """Compute the variances of rows (N, 2n)."""
+        """Compute the variances of rows.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, 2n)
+            Rows (x, q).
+
+        Returns
+        -------
+        ndarray of shape (N,)
+            Variances.
+        """
         x, q = split(X, None)
         squares = np.einsum("nd,nd->n", q, q) * np.einsum("nd,nd->n", x, x)
         return squares + np.einsum("nd,nd->n", q, x) ** 2
 
     def is_stationary(self) -> bool:
-        """Return False: policies grow with the state."""
+        """Return False: policies grow with the state.
+
+        Returns
+        -------
+        bool
+            False.
+        """
         return False
 
     def __repr__(self) -> str:
         return "CurlFreeQuadratic()"
-
-
-def split(rows: Array, n_actions: int | None) -> tuple[Array, Array]:
-    """Split rows into states and directions.
-
-    Parameters
-    ----------
-    rows : ndarray of shape (N, n + d)
-        Pairs (x, q).
-    n_actions : int or None
-        d; None for as many as states.
-
-    Returns
-    -------
-    x, q : ndarray of shape (N, n) and (N, d)
-        States and directions.
-
-    Raises
-    ------
-    PolicyError
-        The columns are not as many for states as for actions, though they have to be.
-    """
-    columns = rows.shape[1]
-    if n_actions is None:
-        if columns % 2:
-            raise PolicyError(
-                f"rows of {columns} columns are no states with as many actions: give Separable(kernel, n_actions=...)"
-            )
-        n_actions = columns // 2
-    return rows[:, :-n_actions], rows[:, -n_actions:]
-
-
-def pair(states: Array, directions: Array) -> Array:
-    """Write states and directions side by side, as kernels take them.
-
-    Parameters
-    ----------
-    states : ndarray of shape (N, n)
-        x.
-    directions : ndarray of shape (N, d)
-        q.
-
-    Returns
-    -------
-    ndarray of shape (N, n + d)
-        Rows (x, q).
-    """
-    return np.concatenate([states, directions], axis=1)
-
-
-def every_direction(states: Array, d: int) -> Array:
-    """Write each state beside each axis of the actions.
-
-    Parameters
-    ----------
-    states : ndarray of shape (N, n)
-        x.
-    d : int
-        Number of actions.
-
-    Returns
-    -------
-    ndarray of shape (N d, n + d)
-        Rows; those of a state follow each other.
-    """
-    return pair(np.repeat(states, d, axis=0), np.tile(np.eye(d), (len(states), 1)))
-
-
-def parts_of(kernel: Kernel) -> list[Kernel]:
-    """List a kernel and all that it is made of.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        Any.
-
-    Returns
-    -------
-    list of Kernel
-        The kernel itself first.
-    """
-    inner = [value for value in kernel.get_params(deep=True).values() if isinstance(value, Kernel)]
-    return [kernel, *inner]
-
-
-def is_separable(kernel: Any) -> bool:
-    """Whether all actions vary alike, and apart from each other.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        On pairs of states and directions.
-
-    Returns
-    -------
-    bool
-        False where some part of it is curl-free.
-    """
-    return not any(isinstance(part, CurlFree | CurlFreeQuadratic) for part in parts_of(kernel))
 
 
 def _squared_distances(x: Array, y: Array) -> Array:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from unconstrain.features.scaling import Scaling
-from unconstrain.gaussian_process.kernels import every_direction
+from unconstrain.gaussian_process.pairs import every_direction
 from unconstrain.gaussian_process.rows import Rows
 
 BLOCK = 2**22

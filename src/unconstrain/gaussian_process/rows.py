@@ -15,7 +15,7 @@ import numpy as np
 
 from unconstrain.fitting.kernels.products import pairs as index_pairs
 from unconstrain.fitting.observation import Observation
-from unconstrain.gaussian_process.kernels import pair
+from unconstrain.gaussian_process.pairs import pair
 
 LEAST_SHARE = 1e-3
 """Of the largest information of a sample, below which it says nothing along a direction."""

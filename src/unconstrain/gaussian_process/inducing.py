@@ -60,7 +60,11 @@ class InducingFeatures:
 
     def along(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Compute the features along one direction at each state, (N, P); see `features.base`."""
-        return self.kernel(pair(self.scaling(X), directions), self.pairs) @ self.whitener
+        return self.along_rows(pair(self.scaling(X), directions))
+
+    def along_rows(self, pairs: np.ndarray) -> np.ndarray:
+        """Compute the features of rows of standardised states and directions, (N, P)."""
+        return np.asarray(self.kernel(pairs, self.pairs) @ self.whitener)
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy, (N, d); see `features.base`."""

@@ -43,7 +43,7 @@ class GaussianProcessPolicy(Policy):
     It learns from what each sample shows along directions: a free sample in all d, a constrained one along its
     motion, one whose projection is known behind that. Kernel, widths, amplitudes and noise are those of largest
     marginal likelihood, found from up to 500 observed numbers that lie far apart. Up to 4,000 numbers the posterior
-    is exact, beyond it rests on 2,100 inducing ones, up to 10^5 samples; `approximation_` says which. There is no
+    is exact, beyond it rests on 1,400 inducing ones, up to 10^5 samples; `approximation_` says which. There is no
     `partial_fit`.
 
     Parameters

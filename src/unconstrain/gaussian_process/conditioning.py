@@ -171,7 +171,8 @@ def condition_on_all(
     features = place_features(evidence, X, d, INDUCING)
     # What inducing rows leave out of a sample's variance counts as its noise, as in the fully independent training
     # conditional: without it few of them are far too sure.
-    kept = share / (share + features.missed(X))
+    blocks = [X[start : start + BLOCK_ROWS] for start in range(0, len(X), BLOCK_ROWS)]
+    kept = share / (share + np.concatenate([features.missed(block) for block in blocks]))
     kept = kept if weights is None else kept * weights
     parts: list[Moments | None] = [None] * (int(fold.max()) + 1)
     for k in np.unique(fold).tolist():

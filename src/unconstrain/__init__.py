@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from unconstrain.evaluation import Evaluation, evaluate
     from unconstrain.features import DecoupledFeatures, NormalizedRBF, PotentialFeatures
     from unconstrain.fitting import moments
+    from unconstrain.gaussian_process import kernels
     from unconstrain.policies import (
+        GaussianProcessPolicy,
         LocallyLinearPolicy,
         ParametricPolicy,
         RegressorPolicy,
@@ -50,6 +52,7 @@ __all__ = [
     "Demonstrations",
     "Evaluation",
     "FeatureConstraint",
+    "GaussianProcessPolicy",
     "Inspection",
     "LocallyLinearPolicy",
     "MechanismConstraint",
@@ -69,6 +72,7 @@ __all__ = [
     "fit_stream",
     "identifiability",
     "inspect",
+    "kernels",
     "load",
     "load_compiled",
     "load_constraint",
@@ -97,6 +101,7 @@ _HOMES = {
     "unconstrain.evaluation": ("Evaluation", "evaluate"),
     "unconstrain.features": ("DecoupledFeatures", "NormalizedRBF", "PotentialFeatures"),
     "unconstrain.policies": (
+        "GaussianProcessPolicy",
         "LocallyLinearPolicy",
         "ParametricPolicy",
         "RegressorPolicy",
@@ -123,6 +128,7 @@ _NAMESPACES = {
     "distributed": "unconstrain.scaling.cluster",
     "errors": "unconstrain.errors",
     "features": "unconstrain.features",
+    "kernels": "unconstrain.gaussian_process.kernels",
     "metrics": "unconstrain.metrics",
     "moments": "unconstrain.fitting.moments",
     "plot": "unconstrain.plot",

@@ -77,9 +77,16 @@ def test_contact_and_noise_are_inferred_and_a_policy_learnt_that_is_as_good_as_t
     assert policy.score(X, U, groups=episodes) > 0.9
 
 
-def test_where_nothing_is_in_the_way_it_is_ordinary_regression():
-    X, U, _, episodes, _ = linear(600, noise=0.1, free=1.0)
-    policy = uc.TorchPolicy(**{**QUICK, "max_epochs": 30}).fit(X, U, groups=episodes)
+def test_where_nothing_is_in_the_way_it_is_ordinary_regression_by_the_network_or_by_its_linear_part():
+    X, U, _, episodes, _ = linear(600, free=1.0)
+    options = {**QUICK, "max_epochs": 30}
+    policy = uc.TorchPolicy(**options).fit(X, U, groups=episodes)
+    assert next(iter(policy.log_likelihoods_)) == "all free"
+    assert policy.free_share_ == pytest.approx(1.0)
+    linear_too = uc.ParametricPolicy().fit(X, U, groups=episodes)
+    np.testing.assert_allclose(policy.predict(X), linear_too.predict(X), atol=1e-9)
+    bent = U + np.sin(3 * X) + 0.1 * np.random.default_rng(1).normal(size=U.shape)
+    policy = uc.TorchPolicy(**options).fit(X, bent, groups=episodes)
     assert next(iter(policy.log_likelihoods_)) == "all free"
     np.testing.assert_array_equal(policy.predict(X), policy.ordinary_regression().predict(X))
 

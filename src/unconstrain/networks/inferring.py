@@ -159,9 +159,15 @@ class Member:
         for number, name, weights, variance in starts:
             start = believe(weights, max(variance, self._floor), drift=Drift() if d > 1 else None)
             self._run(name, number, tell, partial(self._infer, name=name, belief=start))
+        ends = [self.done[FROM_DIRECT], self.done[FROM_INCONSISTENCY]]
         if self.linear is not None:
             self._run(LINEAR, 6, tell, self._take_linear)
-        ends = [self.done[name] for name in (FROM_DIRECT, FROM_INCONSISTENCY, LINEAR) if name in self.done]
+            linear = self.done[LINEAR]
+            assert linear.belief is not None
+            if not linear.belief.held:
+                ends.append(linear)
+            elif _likelihood(linear) > _likelihood(self.done[FREE]):
+                self.done[FREE] = replace(linear, name=FREE)
         end = max(ends, key=_likelihood).belief
         assert end is not None
         warmer = Noise(min(WARMTH * end.noise.action, quarter))
@@ -312,7 +318,7 @@ def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str
     log_likelihoods : dict of str to float
         Of a held-out sample by run, the one chosen first.
     """
-    names = [name for name in NAMES if all(name in each for each in members)]
+    names = [name for name in NAMES if all(_is_compared(each.get(name)) for each in members)]
     tallies = {name: _total([each[name].tally for each in members]) for name in names}
     likelihoods = {name: tally.log_likelihood / tally.n_samples for name, tally in tallies.items()}
 
@@ -328,6 +334,9 @@ def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str
     for name in names:
         # What a gain counts hangs on the evidence of the run that gains.
         best = name if gain(name, FREE) > 0 and gain(name, best) > 0 else best
+    # Whether there is contact was decided for the linear policy by itself; what is left is which predicts better.
+    if LINEAR in names and likelihoods[LINEAR] - likelihoods[best] > NOTICEABLE:
+        best = LINEAR
     return best, dict(sorted(likelihoods.items(), key=lambda item: item[0] != best))
 
 
@@ -355,6 +364,13 @@ def _describe(name: str, belief: Belief, tally: Tally) -> dict[str, Any]:
         "free_share": float(states[0] / states.sum()),
         "evidence": tally.evidence,
     }
+
+
+def _is_compared(candidate: Candidate | None) -> bool:
+    """Whether a run has a likelihood of its own: a linear policy that found all samples free counts as "all free"."""
+    if candidate is None or candidate.belief is None:
+        return False
+    return candidate.name != LINEAR or not candidate.belief.held
 
 
 def _likelihood(candidate: Candidate) -> float:

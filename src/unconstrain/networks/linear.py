@@ -1,7 +1,7 @@
 """The linear policy behind the samples, which far less data determine than a network: one more place to start from."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from unconstrain.features.base import fit_features
 from unconstrain.features.full import as_features
 from unconstrain.fitting.accumulator import Accumulator
-from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief
 from unconstrain.fitting.global_model import GlobalModel
 from unconstrain.fitting.inference import infer_contact
@@ -32,7 +31,7 @@ class Linear:
     intercept : ndarray of shape (d,)
         Where these are zero.
     belief : Belief
-        Of contact and noise.
+        Of contact and noise; `held` where no contact was found.
     log_likelihood : float
         Of a sample, each held out in turn.
     """
@@ -79,6 +78,5 @@ def fit_linear(network: NetworkModel, model: Any, data: Data, least: float) -> L
     slopes, intercept = features.linear(solution.w)  # type: ignore[attr-defined]
     belief = solution.belief
     assert belief is not None
-    belief = replace(belief, chain=Chain() if belief.held else belief.chain, held=None)
     likelihood = next(iter(solution.record.log_likelihoods.values()))
     return Linear(slopes / network.unit, intercept / network.unit, belief, likelihood)

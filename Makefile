@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test fuzz bench reproduce format clean
+.PHONY: demo test test-torch fuzz bench reproduce format clean
 
 demo: $(VENV)/.demo
 	$(BIN)/unconstrain demo --out out/demo --overwrite
@@ -15,6 +15,12 @@ test: $(VENV)/.test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2
+
+# PyTorch is 190 MB, and no other test needs it. Where the registry has it for GPUs alone, which is far more, say
+# TORCH='torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu'.
+TORCH ?= torch==2.13.0
+test-torch: $(VENV)/.torch
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest tests/torch tests/policies/test_torch_policy.py
 
 # Any number of inputs that nobody meant to give; those that fail are kept in out/fuzz.
 N ?= 1000
@@ -48,3 +54,7 @@ $(VENV)/.demo: pyproject.toml | $(BIN)/python
 $(VENV)/.test: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $@ $(VENV)/.demo
+
+$(VENV)/.torch: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet $(TORCH)
+	@touch $@

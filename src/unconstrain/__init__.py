@@ -13,7 +13,7 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces
+    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces, torch
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         LocallyLinearPolicy,
         ParametricPolicy,
         RegressorPolicy,
+        TorchPolicy,
         load_compiled,
         load_policy,
     )
@@ -62,6 +63,7 @@ __all__ = [
     "Preparation",
     "Recordings",
     "RegressorPolicy",
+    "TorchPolicy",
     "constraints",
     "distributed",
     "errors",
@@ -82,6 +84,7 @@ __all__ = [
     "robots",
     "select_policy",
     "spaces",
+    "torch",
 ]
 
 _HOMES = {
@@ -102,6 +105,7 @@ _HOMES = {
         "LocallyLinearPolicy",
         "ParametricPolicy",
         "RegressorPolicy",
+        "TorchPolicy",
         "load_compiled",
         "load_policy",
     ),
@@ -130,6 +134,7 @@ _NAMESPACES = {
     "plot": "unconstrain.plot",
     "robots": "unconstrain.robots",
     "spaces": "unconstrain.spaces",
+    "torch": "unconstrain.torch",
 }
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours

@@ -92,5 +92,21 @@ class ArchiveError(DataError):
     """
 
 
+class UntrustedArchiveError(ArchiveError):
+    """A saved file that holds classes, functions or parts of regressors that are not trusted.
+
+    Parameters
+    ----------
+    message : str
+        The sentence.
+    names : tuple of str
+        What it holds: "module:name" for classes and functions, "package.module.Class" for parts of regressors.
+    """
+
+    def __init__(self, message: str, names: tuple[str, ...]):
+        super().__init__(message)
+        self.names = names
+
+
 class RobotError(UnconstrainError):
     """A robot file that cannot be used, or a joint or frame that is not in it."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from unconstrain.cli import constraining, recordings, reporting
+from unconstrain.cli import constraining, recordings, reporting, trusting
 from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.progress import working
 
@@ -15,7 +15,10 @@ SHOWN_EPISODES = 20
 @click.argument("policy", type=click.Path(path_type=Path))
 @recordings.recorded
 @constraining.constraint
-def evaluate(policy: Path, recorded: recordings.Recorded, constraint: Path | None) -> None:
+@trusting.trusted
+def evaluate(
+    policy: Path, recorded: recordings.Recorded, constraint: Path | None, trusted: tuple[str, ...]
+) -> None:
     """Hold a saved policy against other recordings.
 
     POLICY was saved by `unconstrain fit`, and FILES are read as those it was learnt from, unless an option says
@@ -24,10 +27,9 @@ def evaluate(policy: Path, recorded: recordings.Recorded, constraint: Path | Non
     """
     from unconstrain.evaluation import evaluate as hold_against
     from unconstrain.evaluation.evaluation import COLUMNS
-    from unconstrain.policies import load_policy
     from unconstrain.policies.inferred import describe_inferred
 
-    learnt = load_policy(policy)
+    learnt = trusting.load(policy, trusted)
     with working("reading"):
         recorded = recorded.like(getattr(learnt, "recording_", None))
         demos = constraining.tell(recorded.load(), constraint)

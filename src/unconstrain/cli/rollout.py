@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from unconstrain.cli import limiting, outputs, reporting, stabilizing
+from unconstrain.cli import limiting, outputs, reporting, stabilizing, trusting
 from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.cli.declared import Number, Numbers
 from unconstrain.errors import DataError
@@ -93,6 +93,7 @@ if TYPE_CHECKING:
 @outputs.out("rollout.csv", "Where the movement is written (CSV).")
 @outputs.figure("Where it is drawn", "rollout.png")
 @outputs.overwrite
+@trusting.trusted
 def rollout(
     policy: Path,
     start: list[float],
@@ -108,6 +109,7 @@ def rollout(
     out: Path,
     figure: Path,
     overwrite: bool,
+    trusted: tuple[str, ...],
 ) -> None:
     """Integrate a saved policy from a start, free or under a constraint.
 
@@ -119,13 +121,12 @@ def rollout(
     import numpy as np
 
     from unconstrain import plot
-    from unconstrain.policies import load_policy
     from unconstrain.policies.unsure import Unsure
     from unconstrain.recordings.text import write_csv
     from unconstrain.simulation import rollout as integrate
     from unconstrain.stopping import Limits, MovementStopped, Stop, describe_stop
 
-    learnt = load_policy(policy)
+    learnt = trusting.load(policy, trusted)
     begin = _completed(start, "start=", learnt.space_)
     for row in block:
         _check_length(row, "block=", learnt.n_actions_, "actions")

@@ -8,6 +8,7 @@ Each kind of compiled policy that can be written so has a method `draw`, which b
 | linear | x Wᵀ + t                                 |
 | rbf    | Softmax(e) Wᵀ                            |
 | local  | Σ_m Softmax(e)_m (B_m x + t_m)           |
+| network| Gemm and Tanh, layer by layer            |
 
 The exponents are `e_i = (c_i - m)ᵀ(x - m) / σ² - ‖c_i - m‖² / 2σ²`, m the centres' mean: what is left of
 `-‖x - c_i‖² / 2σ²` without the part that all centres share, which `Softmax` would take out anyway. That is one
@@ -183,7 +184,7 @@ def save(step: CompiledPolicy, path: str | PathLike[str]) -> None:
     """
     if not isinstance(step, Drawable):
         raise PolicyError(
-            "linear, NormalizedRBF and locally linear policies can be written as ONNX, "
+            "linear, NormalizedRBF and locally linear policies and networks can be written as ONNX, "
             f"this one is {step.kind}: use compile().save(path) instead"
         )
     try:

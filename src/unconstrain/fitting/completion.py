@@ -29,15 +29,13 @@ from numpy.typing import NDArray
 from unconstrain.fitting.contact import Belief, Found, judge
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import Observation, squared_errors
+from unconstrain.fitting.regression import Trend
 from unconstrain.samples import Samples
 
 Floats = NDArray[np.float64]
 
 COOLING = 0.7
 """By what the noise's deviation is lowered from one round to the next, at most."""
-
-MOST_MOMENTUM = 0.7
-"""A longer prolongation gains nothing in a few dozen rounds, and amplifies what trees make of halves dealt out anew."""
 
 SETTLING = 5
 """Passes in which noise and contact are adjusted to the same predictions, before these are judged."""
@@ -165,8 +163,10 @@ class Rounds:
         Where it starts.
     rule : Rule
         By which targets are completed.
+    trend : Trend or None
+        What the regressor learns the rest of; None stands for zero.
     prior : ndarray of shape (N, d)
-        What the regressor learns the rest of.
+        The actions that it says.
     ahead : ndarray of shape (N, d)
         Predictions that the first round begins with.
     predict : callable
@@ -175,6 +175,7 @@ class Rounds:
 
     name: str
     rule: Any
+    trend: Trend | None
     prior: Floats
     ahead: Floats
     predict: Callable[[Floats], Floats]
@@ -203,7 +204,7 @@ class Rounds:
         P = self.prior + self.predict(targets - self.prior)
         score = self.rule.judge(P)
         self.n_rounds += 1
-        is_worse = score < self.score
+        is_worse = score < self.score - ENOUGH
         self.since_best = 0 if score > self.score + ENOUGH else self.since_best + 1
         if score > self.score:
             self.score, self.targets, self.predictions = score, targets, P
@@ -211,7 +212,7 @@ class Rounds:
             self.ahead, self._momentum = P, 1.0
         else:
             following = (1 + np.sqrt(1 + 4 * self._momentum**2)) / 2
-            share = min((self._momentum - 1) / following, MOST_MOMENTUM)
+            share = (self._momentum - 1) / following
             self.ahead, self._momentum = P + share * (P - self._before), following
         self._before = P
         return score

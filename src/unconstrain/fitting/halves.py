@@ -17,6 +17,7 @@ from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.multioutput import MultiOutputRegressor
+from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline
 from sklearn.utils import get_tags
 
@@ -43,7 +44,10 @@ def as_multi_output(regressor: Any, n_actions: int) -> Any:
     estimator
         Not fitted.
     """
-    if n_actions == 1 or get_tags(regressor).target_tags.multi_output:
+    last = regressor[-1] if isinstance(regressor, Pipeline) else regressor
+    # Networks take several targets, though their tags do not say so.
+    is_network = isinstance(last, MLPRegressor)
+    if n_actions == 1 or is_network or get_tags(regressor).target_tags.multi_output:
         return regressor
     return MultiOutputRegressor(regressor)
 

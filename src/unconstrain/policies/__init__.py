@@ -3,6 +3,7 @@
 from unconstrain.deploy.compiled import CompiledPolicy, load_compiled
 from unconstrain.policies.gaussian_process import GaussianProcessPolicy
 from unconstrain.policies.locally_linear import LocallyLinearPolicy
+from unconstrain.policies.network import TorchPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.policies.regressor import RegressorPolicy
 from unconstrain.policies.saving import load_policy
@@ -13,6 +14,7 @@ __all__ = [
     "LocallyLinearPolicy",
     "ParametricPolicy",
     "RegressorPolicy",
+    "TorchPolicy",
     "load_compiled",
     "load_policy",
 ]

@@ -58,6 +58,8 @@ class Policy(RegressorMixin, BaseEstimator):
     """
 
     risks: ClassVar[tuple[str, ...]] = ("adaptive", "inconsistency", "direct")
+    with_streams: ClassVar[str] = "needs all samples at once, and a stream is read block by block"
+    """What to say to whoever gives a policy of this kind to `fit_stream`."""
 
     risk: str
     space: Space | None

@@ -19,6 +19,7 @@ from unconstrain.fitting.contact import Belief, Tally, judge
 from unconstrain.fitting.drift import Drift
 from unconstrain.fitting.halves import Halves
 from unconstrain.fitting.inference import (
+    AGAIN,
     DECISIVE,
     FREE,
     FROM_DIRECT,
@@ -27,6 +28,7 @@ from unconstrain.fitting.inference import (
     NOTICEABLE,
     SPEED,
     SPEED_AT_FIRST,
+    WARMTH,
 )
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import observe, unknown
@@ -43,6 +45,9 @@ FROM_LINEAR = "inferred, from the linear policy"
 
 FIRST_ROUNDS = 4
 """Rounds from each start, after which the likelier goes on alone; fewer where fits are."""
+
+WARM_ROUNDS = 8
+"""Rounds that go on from the end of these with more noise."""
 
 FITS_A_ROUND, STARTS = 2, 3
 
@@ -115,10 +120,10 @@ class Completing:
         start = linear(samples.states)
         observation = observe("inconsistency", samples.actions, samples.projections)
         rule = ByRisk(observation, samples.weights)
-        rounds = self._rounds("inconsistency", rule, self._prior(linear), start)
+        rounds = self._rounds("inconsistency", rule, linear, start)
         self._go_on(rounds)
         assert rounds.targets is not None
-        return Completed(rounds.targets, linear if self.has_trend else None, history=tuple(self.history))
+        return Completed(rounds.targets, rounds.trend, history=tuple(self.history))
 
     def infer(self, regression: Trend) -> Completed:
         """Complete by the adaptive risk.
@@ -133,46 +138,29 @@ class Completing:
         Completed
             The targets of the likeliest round, or the actions where all samples are free.
         """
-        linear = self._learn_adaptive()
-        trend, start, variance = linear
-        free = self._assume_free(regression if self._nothing_is_known else trend)
-        assert free.predictions is not None
-        U = self.samples.actions
-        drift = None if U.shape[1] == 1 else Drift()
-        seeming = find_noise(U, free.predictions, self.samples.weights, self._least)
-        from_direct = self._rounds(
-            FROM_DIRECT,
-            self._rule(Belief(None, seeming, drift=drift, is_cooling=True)),
-            free.prior,
-            free.predictions,
-        )
-        from_linear = self._rounds(
-            FROM_LINEAR,
-            self._rule(Belief(None, Noise(max(variance, self._least)), drift=drift, is_cooling=True)),
-            self._prior(trend),
-            start,
-        )
-        for rounds in (from_linear, from_direct):
-            self._go_on(rounds, self._first_rounds)
-        best = max(from_linear, from_direct, key=lambda rounds: rounds.score)
+        linear, variance = self._learn_adaptive()
+        free = self._assume_free(regression if self._nothing_is_known else linear)
+        first = self._try_starts(free, linear, variance)
+        again = self._warm(max(first, key=_score))
+        self._go_on(again, WARM_ROUNDS)
+        runs = [*first, again, free]
+        best = max(runs[:-1], key=_score)
         self._go_on(best)
-        likelihoods = {rounds.name: rounds.score for rounds in (from_linear, from_direct, free)}
-        best = best if self._beats(best, free) else free
-        faster = None if best is free else self._vary_speed(best)
-        if faster is not None:
+        if not self._beats(best, free):
+            best = free
+        elif (faster := self._vary_speed(best)) is not None:
             self._go_on(faster)
-            best, likelihoods[SPEED] = faster, faster.score
-        trends = {FREE: regression if self._nothing_is_known else trend, FROM_DIRECT: regression}
+            runs.append(faster)
+            best = faster
         assert best.targets is not None
         assert best.predictions is not None
         belief = best.rule.settle(best.predictions)
-        ordered = dict(sorted(likelihoods.items(), key=lambda item: item[0] != best.name))
         return Completed(
             best.targets,
-            self._trend_of(best, {**trends, FROM_LINEAR: trend}),
+            best.trend,
             belief,
             judge(best.predictions, belief, self.samples).tally,
-            ordered,
+            {run.name: run.score for run in sorted(runs, key=lambda run: run is not best)},
             tuple(self.history),
         )
 
@@ -206,9 +194,6 @@ class Completing:
         scale = float(np.mean(np.einsum("nd,nd->n", U, U)))
         return max(LEAST_NOISE**2 * scale / U.shape[1], self.noise**2)
 
-    def _prior(self, trend: Trend) -> Floats:
-        return trend(self.samples.states) if self.has_trend else np.zeros_like(self.samples.actions)
-
     def _fit_linear(self, risk: str) -> ParametricPolicy:
         X, U, groups, known, weights = self.samples
         several = groups is not None and bool(np.any(groups != groups[0]))
@@ -220,20 +205,34 @@ class Completing:
             projections=None if risk == "direct" else known,
         )
 
-    def _learn_adaptive(self) -> tuple[Trend, Floats, float]:
-        """Return the linear policy behind these samples, what it predicts, and the variance that it leaves.
+    def _learn_adaptive(self) -> tuple[Trend, float]:
+        """Return the linear policy behind these samples, and the variance that it leaves.
 
-        Where it finds no contact it is ordinary regression, from which another start leads; what is taken instead
-        is the inconsistency, with so much noise that all that it finds may be wrong.
+        Where it finds no contact it is ordinary regression, from which another start leads; what is taken instead is
+        the inconsistency, with so much noise that all that it finds may be wrong.
         """
-        U = self.samples.actions
         policy = self._fit_linear("adaptive")
-        variance = policy.noise_**2
-        if finds_no_contact(policy):
-            policy = self._fit_linear("inconsistency")
-            variance = 0.25 * float(np.mean(U**2))
-        trend = _as_trend(policy)
-        return trend, trend(self.samples.states), variance
+        if not finds_no_contact(policy):
+            return _as_trend(policy), policy.noise_**2
+        return self.learn_linear("inconsistency"), 0.25 * float(np.mean(self.samples.actions**2))
+
+    def _try_starts(self, free: Rounds, linear: Trend, variance: float) -> list[Rounds]:
+        """Go a few rounds from ordinary regression and from the linear policy."""
+        U = self.samples.actions
+        assert free.predictions is not None
+        drift = None if U.shape[1] == 1 else Drift()
+        seeming = find_noise(U, free.predictions, self.samples.weights, self._least)
+        left = Noise(max(variance, self._least))
+        starts = [
+            (FROM_LINEAR, left, linear, linear(self.samples.states)),
+            (FROM_DIRECT, seeming, free.trend, free.predictions),
+        ]
+        runs = []
+        for name, noise, trend, start in starts:
+            rule = self._rule(Belief(None, noise, drift=drift, is_cooling=True))
+            runs.append(self._rounds(name, rule, trend, start))
+            self._go_on(runs[-1], self._first_rounds)
+        return runs
 
     def _assume_free(self, trend: Trend) -> Rounds:
         """Take all samples for free whose projection is not known, and judge that by residuals with heavy tails."""
@@ -241,7 +240,7 @@ class Completing:
         start = trend(self.samples.states)
         noise = find_noise(U, start, weights, self._least)
         rule = self._rule(Belief(None, noise, chain=Chain.held("free"), held="free"))
-        rounds = self._rounds(FREE, rule, self._prior(trend), start)
+        rounds = self._rounds(FREE, rule, trend, start)
         self._go_on(rounds, 1 if self._nothing_is_known else self._first_rounds)
         assert rounds.predictions is not None
         views = judge(rounds.predictions, rule.settle(rounds.predictions), self.samples).views
@@ -249,6 +248,18 @@ class Completing:
         omega = np.ones(len(U)) if weights is None else weights
         rounds.score = max(rounds.score, find_heavy_tailed(squares, views.ranks, omega, self._least))
         return rounds
+
+    def _warm(self, first: Rounds) -> Rounds:
+        """Go on from the predictions of other rounds, with more noise.
+
+        A free sample that is taken for constrained teaches nothing across its sphere, so that the policy stays wrong
+        there, and the sample far from it. With more noise a policy that is nearly right takes it for free.
+        """
+        assert first.predictions is not None
+        belief = first.rule.settle(first.predictions)
+        noise = replace(belief.noise, action=WARMTH * belief.noise.action)
+        warm = replace(belief, noise=noise, chain=Chain(), is_cooling=True)
+        return self._rounds(AGAIN, self._rule(warm), first.trend, first.predictions)
 
     def _vary_speed(self, best: Rounds) -> Rounds | None:
         """Go on from the end of other rounds with noise in the speed, where that explains clearly more."""
@@ -275,16 +286,13 @@ class Completing:
         assert rounds.predictions is not None
         return judge(rounds.predictions, rounds.rule.settle(rounds.predictions), self.samples).tally
 
-    def _trend_of(self, best: Rounds, trends: dict[str, Trend]) -> Trend | None:
-        if not self.has_trend:
-            return None
-        return next(trend for trend in trends.values() if np.array_equal(self._prior(trend), best.prior))
-
     def _rule(self, belief: Belief) -> ByBelief:
         return ByBelief(self.samples, belief, self._least)
 
-    def _rounds(self, name: str, rule: Any, prior: Floats, start: Floats) -> Rounds:
-        return Rounds(name, rule, prior, start, self.halves.predict)
+    def _rounds(self, name: str, rule: Any, trend: Trend | None, start: Floats) -> Rounds:
+        if trend is None or not self.has_trend:
+            return Rounds(name, rule, None, np.zeros_like(self.samples.actions), start, self.halves.predict)
+        return Rounds(name, rule, trend, trend(self.samples.states), start, self.halves.predict)
 
     def _go_on(self, rounds: Rounds, most: int | None = None) -> None:
         """Go through rounds until they gain nothing, there were enough, or fits run out."""
@@ -306,3 +314,7 @@ class Completing:
 
 def _as_trend(policy: ParametricPolicy) -> Trend:
     return Trend(policy.model_, policy.solution_.w)
+
+
+def _score(rounds: Rounds) -> float:
+    return rounds.score

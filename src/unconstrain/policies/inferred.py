@@ -90,7 +90,7 @@ def describe_inferred(policy: Policy) -> str:
     if likelihoods:
         chosen = next(iter(likelihoods))
         others = [f"{likelihoods[name]:.4g} if {name}" for name in (FREE, CONSTRAINED) if name in likelihoods]
-        held_out = "held-out " if policy.alpha == "cv" else ""
+        held_out = "held-out " if getattr(policy, "alpha", "cv") == "cv" else ""
         lines.append(
             f"log-likelihood of a {held_out}sample: {policy.log_likelihood_:.4g} as inferred, {', '.join(others)}"
         )

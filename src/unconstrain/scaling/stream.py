@@ -175,9 +175,8 @@ def open_for(
     if not isinstance(policy, LinearPolicy):
         if isinstance(policy, Policy):
             raise PolicyError(
-                f"a {type(policy).__name__} needs all samples at once, and a stream is read block by block: a "
-                "ParametricPolicy and a LocallyLinearPolicy learn from it, with any risk but the adaptive one in one "
-                "pass; or load fewer samples"
+                f"a {type(policy).__name__} {policy.with_streams}: a ParametricPolicy and a LocallyLinearPolicy learn "
+                "from it, with any risk but the adaptive one in one pass"
             )
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")
     policy.check_options()

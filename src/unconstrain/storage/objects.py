@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.errors import ArchiveError
+from unconstrain.errors import UntrustedArchiveError
 from unconstrain.storage.archive import FilePath, Kind, damaged, read, write
 from unconstrain.storage.encoding import UntrustedError, decode, encode
 
@@ -88,9 +88,10 @@ def load_object(
         # What a regressor is made of is often hidden deep in its package, and so is trusted by name.
         own = [f'"{name}"' if ":" not in name else name.rpartition(":")[2] for name in error.names]
         classes = "import what it names and " if any(":" in name for name in error.names) else ""
-        raise ArchiveError(
+        raise UntrustedArchiveError(
             f"{os.fspath(path)} holds {', '.join(shown)}, which unconstrain does not know: if you trust the file's "
-            f"source, {classes}load it with {loader}(path, trusted=[{', '.join(own)}])"
+            f"source, {classes}load it with {loader}(path, trusted=[{', '.join(own)}])",
+            tuple(error.names),
         ) from None
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,6 +1,6 @@
 """Policies for a control loop: arrays, and a handful of NumPy calls on one state.
 
-A compiled policy is of one of five kinds, named by what it evaluates. b are normalised Gaussian activations,
+A compiled policy is of one of six kinds, named by what it evaluates. b are normalised Gaussian activations,
 `b_i = K_i / Σ_j K_j` with `K_i = exp(-‖x - c_i‖² / 2σ²)`:
 
 | kind      | π(x)                              | arrays                                                              |
@@ -10,6 +10,7 @@ A compiled policy is of one of five kinds, named by what it evaluates. b are nor
 | local     | Σ_m b_m(x) (B_m x + t_m)          | centers (M, n), width, coef (M, d, n), intercept (M, d)             |
 | potential | -∇ wᵀb(x)                         | centers (M, n), width, weights (M,)                                 |
 | additive  | Σ_j f_j(x_j), f_j of polynomials  | breaks (n, K), origins (n, K+1), polynomials (n, K+1, degree+1, d)  |
+| network   | mean_e [L z + W h(z) + b]         | weights (E, P), sizes (K+1,), center, spread (n,)                   |
 
 `InSpace` is one of these behind what a space makes of the state, and before a scale. `Stabilized` is any of them, and
 the smallest change of its actions that leads to a goal; `Cyclic` that which keeps to a cycle.
@@ -26,6 +27,7 @@ from unconstrain.deploy.compiled.cyclic import Cyclic
 from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
 from unconstrain.deploy.compiled.loading import load_compiled
+from unconstrain.deploy.compiled.perceptron import Perceptron
 from unconstrain.deploy.compiled.stabilized import Stabilized
 
 __all__ = [
@@ -35,6 +37,7 @@ __all__ = [
     "InSpace",
     "Linear",
     "LocallyLinear",
+    "Perceptron",
     "Potential",
     "RadialBasis",
     "Stabilized",

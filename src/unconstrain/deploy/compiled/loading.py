@@ -8,12 +8,13 @@ from unconstrain.deploy.compiled.centered import LocallyLinear, Potential, Radia
 from unconstrain.deploy.compiled.cyclic import CYCLE_ARRAYS, Cyclic
 from unconstrain.deploy.compiled.in_space import InSpace
 from unconstrain.deploy.compiled.linear import Linear
+from unconstrain.deploy.compiled.perceptron import Perceptron
 from unconstrain.deploy.compiled.stabilized import STABLE_ARRAYS, Stabilized
 from unconstrain.errors import UnconstrainError
 from unconstrain.storage import Kind, damaged, read
 
 KINDS: dict[str, type[CompiledPolicy]] = {
-    cls.kind: cls for cls in (Linear, RadialBasis, LocallyLinear, Potential, Additive)
+    cls.kind: cls for cls in (Linear, RadialBasis, LocallyLinear, Potential, Additive, Perceptron)
 }
 
 SPACE_ARRAYS = ("space_base", "space_scale")

@@ -142,7 +142,7 @@ def measure_all() -> Iterator[Row]:
 
 
 def print_tables() -> None:
-    """Print errors and times, a row a data set and a column a kind."""
+    """Print errors and times, a row a data set that was learnt and a column a kind."""
     kinds = list_kinds()
     for kind in set(KINDS) - set(kinds):
         print(f"{kind} is left out: {NEEDS[kind]} is not installed")
@@ -159,5 +159,7 @@ def print_tables() -> None:
         print("| --- " * (3 + len(kinds)) + "|")
         for rows, n, noise in settings():
             cells = [found[kind, rows, n, noise] for kind in kinds]
+            if all(np.isnan(row.fit) for row in cells):
+                continue
             written = ["-" if np.isnan(row.fit) else write(row) for row in cells]
             print(f"| {rows:,} | {n} | {noise:.0%} | {' | '.join(written)} |")

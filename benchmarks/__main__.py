@@ -2,6 +2,7 @@
 
 python -m benchmarks                      all
 python -m benchmarks local-fit growth     some
+python -m benchmarks models               which kind of policy for which data: errors and times, no ratios to reach
 python -m benchmarks --out FILE           where the JSON goes (default out/benchmarks.json)
 """
 
@@ -20,7 +21,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, start, step, stream
+from benchmarks import fits, identifiability, models, start, step, stream
 from benchmarks.ratio import Ratio
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
@@ -43,20 +44,28 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     **start.BENCHMARKS,
 }
 
+TABLES: dict[str, Callable[[], None]] = {"models": models.print_tables}
+"""What is compared, not judged; only run by name."""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(BENCHMARKS))
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*BENCHMARKS, *TABLES]))
     parser.add_argument("--out", type=Path, default=Path("out/benchmarks.json"))
     given = parser.parse_args()
-    unknown = set(given.names) - set(BENCHMARKS)
+    unknown = set(given.names) - set(BENCHMARKS) - set(TABLES)
     if unknown:
         parser.error(
-            f"no benchmark is called {', '.join(sorted(unknown))}; there are {', '.join(BENCHMARKS)}"
+            f"no benchmark is called {', '.join(sorted(unknown))}; there are "
+            f"{', '.join([*BENCHMARKS, *TABLES])}"
         )
-    ratios = [
-        BENCHMARKS[name]() for name in track(given.names or list(BENCHMARKS), "benchmarks", transient=True)
-    ]
+    for name in given.names:
+        if name in TABLES:
+            TABLES[name]()
+    names = [name for name in given.names or BENCHMARKS if name in BENCHMARKS]
+    if not names:
+        return
+    ratios = [BENCHMARKS[name]() for name in track(names, "benchmarks", transient=True)]
     given.out.parent.mkdir(parents=True, exist_ok=True)
     versions = {"unconstrain": uc.__version__, "numpy": np.__version__, "scipy": scipy.__version__}
     versions |= {"scikit-learn": sklearn.__version__, "python": platform.python_version()}

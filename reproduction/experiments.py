@@ -20,6 +20,7 @@ EXPERIMENTS = {
     "constraints": "Constraints learnt, measured and used.",
     "identifiability": "What recordings cannot tell.",
     "adaptive": "Which samples were free, inferred.",
+    "regressors": "Regressors of others, wrapped as they are.",
 }
 """In the order of the report."""
 

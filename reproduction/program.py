@@ -157,6 +157,12 @@ _experiment(
     ),
     PART,
 )
+_experiment(
+    "regressors",
+    *RUNNING,
+    click.option("--plant", metavar="NAME", help="Only this plant: cycle, arm or grasp."),
+    click.option("--regressor", metavar="NAME", help="Only this regressor; a wrong name lists them."),
+)
 
 
 @click.command("all", cls=Command)

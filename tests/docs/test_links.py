@@ -9,7 +9,7 @@ import click
 import pytest
 
 import unconstrain as uc
-from benchmarks.__main__ import BENCHMARKS
+from benchmarks.__main__ import BENCHMARKS, TABLES
 from reproduction.program import program as reproduction
 from unconstrain.cli.app import program
 
@@ -69,7 +69,7 @@ def test_every_command_exists_with_its_options(page):
             if words and words[0] not in ("--help", "--version"):
                 check_options(program, words[0], words[1:])
         elif words[1] == "benchmarks":
-            assert {word for word in words[2:] if not word.startswith("-")} <= set(BENCHMARKS), words
+            assert {word for word in words[2:] if not word.startswith("-")} <= {*BENCHMARKS, *TABLES}, words
         elif words[2:] and words[2] not in ("--help",):
             check_options(reproduction, words[2], words[3:])
 

@@ -59,6 +59,7 @@ def test_help_lists_the_experiments_and_their_own_options(program):
         "constraints",
         "identifiability",
         "adaptive",
+        "regressors",
         "all",
         "view",
     ):
@@ -88,6 +89,11 @@ def test_help_lists_the_experiments_and_their_own_options(program):
         (["identifiability", "--part", "toy"], "there is no part 'toy': choose one of report, advice"),
         (["adaptive", "--data", "nowhere"], "there is no folder nowhere: give the folder"),
         (["adaptive", "--part", "toy"], "there is no part 'toy': choose one of cycle, cycle400"),
+        (["regressors", "--plant", "leg"], "there is no plant 'leg': choose one of cycle, arm, grasp"),
+        (
+            ["regressors", "--regressor", "oracle"],
+            "there is no regressor 'oracle': choose one of extra-trees",
+        ),
         (["adaptive", "--part", "handwriting"], "'handwriting' cannot be run: give the folder"),
     ],
 )

@@ -1,0 +1,1 @@
+"""Any regression technique: regressors of others, wrapped as they are, beside the same ones told everything."""

@@ -37,6 +37,11 @@ Floats = NDArray[np.float64]
 COOLING = 0.7
 """By what the noise's deviation is lowered from one round to the next, at most."""
 
+LEAST_INFORMATION = 0.25
+"""Of a sample, in units of a free one's, by which its step is divided. Short actions tell little: followed by their
+gradient alone they would take many rounds, and with what a regressor misses, which is no noise, they are worth
+more than their noise says."""
+
 SETTLING = 5
 """Passes in which noise and contact are adjusted to the same predictions, before these are judged."""
 
@@ -109,10 +114,15 @@ class ByBelief:
     kinds: tuple[str, ...] = ("action",)
 
     def complete(self, P: Floats) -> Floats:
-        """Complete by the gradient of the expected log-likelihood, and go on to the next belief; see `Rule`."""
+        """Complete by the gradient of the expected log-likelihood, and go on to the next belief; see `Rule`.
+
+        It is divided by the information, but not by less than `LEAST_INFORMATION`.
+        """
         found = judge(P, self.belief, self.samples)
         self.belief = self._next(found, self.belief)
-        return P + found.gradient
+        told = found.expand()
+        information = told.blunt + told.towards * np.einsum("nd,nd->n", told.normal, told.normal)
+        return P + found.gradient / np.clip(information, LEAST_INFORMATION, 1.0)[:, None]
 
     def judge(self, P: Floats) -> float:
         """Return the log-likelihood of a sample under the noise and contact that fit P; see `Rule`."""

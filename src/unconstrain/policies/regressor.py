@@ -88,7 +88,7 @@ class RegressorPolicy(Policy):
     >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(500, 1, 2)))
     >>> U = np.einsum("nij,nj->ni", N, Pi)                        # what is recorded
     >>> policy = uc.RegressorPolicy(ExtraTreesRegressor(min_samples_leaf=3, random_state=0)).fit(X, U)
-    >>> bool(uc.metrics.unconstrained_policy_error(Pi, policy.predict(X)) < 0.1 * Pi.var(axis=0).sum())
+    >>> bool(uc.metrics.unconstrained_policy_error(Pi, policy.predict(X)) < 0.15 * Pi.var(axis=0).sum())
     True
     """
 

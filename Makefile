@@ -20,7 +20,8 @@ test: $(VENV)/.test
 # TORCH='torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu'.
 TORCH ?= torch==2.13.0
 test-torch: $(VENV)/.torch
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest tests/torch tests/policies/test_torch_policy.py
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest tests/torch tests/policies/test_torch_policy.py \
+		"tests/test_examples.py::test_the_example_runs[deep_net]"
 
 # Any number of inputs that nobody meant to give; those that fail are kept in out/fuzz.
 N ?= 1000

@@ -36,7 +36,7 @@ print(f"{policy.free_share_:.0%} of the samples were free; {policy.n_fits_} fits
 # names them. Inside the search fewer fits are enough.
 
 search = GridSearchCV(
-    uc.RegressorPolicy(pipeline, max_fits=12),
+    uc.RegressorPolicy(pipeline, max_fits=20),
     {"regressor__kernelridge__gamma": [0.01, 0.3, 10.0]},
     cv=GroupKFold(3),
 )

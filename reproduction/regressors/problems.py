@@ -20,8 +20,8 @@ FREE = (0.0, 0.4, 1.0)
 NOISE = 0.03
 """Of the rms action, in all components of it."""
 
-POWER, CONSTRAINTS, ARM_EPISODES = 1.8, ("1-2-3", "2-4-6"), 20
-"""Of the arm of Table I. It has fewer movements than there, since support vectors take the cube of their time."""
+POWER, CONSTRAINTS, ARM_EPISODES = 1.8, ("1-2-3", "2-4-6"), 100
+"""Of the arm of Table I, as many movements as there."""
 
 
 class Problem(NamedTuple):

@@ -29,6 +29,21 @@ class Samples(NamedTuple):
     projections: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
 
+    def order(self) -> NDArray[np.intp] | None:
+        """Find an order in which each episode's samples follow each other, and keep their own order.
+
+        Returns
+        -------
+        ndarray of shape (N,), int, or None
+            Rows; None where that is so already.
+        """
+        if self.groups is None:
+            return None
+        _, first, label = np.unique(self.groups, return_index=True, return_inverse=True)
+        if np.count_nonzero(label[1:] != label[:-1]) == len(first) - 1:
+            return None
+        return np.argsort(first[label], kind="stable")
+
     def select(self, rows: NDArray[Any]) -> "Samples":
         """Select some of the samples.
 

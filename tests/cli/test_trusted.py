@@ -15,6 +15,7 @@ def test_parts_of_a_regressor_are_asked_for_and_named_by_an_option(run, tmp_path
     asked = err[err.index("--trusted") :].split()
     assert set(asked[1::2]) == {
         "sklearn.neighbors._kd_tree.KDTree",
+        "sklearn.neighbors._regression.KNeighborsRegressor",
         "sklearn.metrics._dist_metrics.EuclideanDistance64",
     }
     code, out, err = run("evaluate", "policy.skops", "d.csv", *COLUMNS, *asked)

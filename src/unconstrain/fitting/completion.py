@@ -26,7 +26,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.fitting.contact import Belief, Found, judge
+from unconstrain.fitting.contact import Belief, Found, Tally, judge
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import Observation, squared_errors
 from unconstrain.fitting.regression import Trend
@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 COOLING = 0.7
 """By what the noise's deviation is lowered from one round to the next, at most."""
 
-LEAST_INFORMATION = 0.25
+LEAST_INFORMATION = 0.5
 """Of a sample, in units of a free one's, by which its step is divided. Short actions tell little: followed by their
 gradient alone they would take many rounds, and with what a regressor misses, which is no noise, they are worth
 more than their noise says."""
@@ -181,6 +181,14 @@ class Rounds:
         Predictions that the first round begins with.
     predict : callable
         From targets (N, d) to held-out predictions of these.
+    score : float
+        What the best round so far explains of held-out samples.
+    apart : float
+        What its targets explain where whole episodes are held out, if that was looked at.
+    apart_tally : Tally, optional
+        What was found then.
+    targets, predictions : ndarray of shape (N, d), optional
+        Of the best round.
     """
 
     name: str
@@ -190,6 +198,8 @@ class Rounds:
     ahead: Floats
     predict: Callable[[Floats], Floats]
     score: float = -np.inf
+    apart: float = -np.inf
+    apart_tally: Tally | None = None
     targets: Floats | None = None
     predictions: Floats | None = None
     n_rounds: int = 0

@@ -6,131 +6,18 @@ regressor that is fitted to one half predicts the other. They are dealt out anew
 reaches all of the other in a few rounds.
 """
 
-import inspect
-import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.multioutput import MultiOutputRegressor
-from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline
-from sklearn.utils import get_tags
 
-from unconstrain.errors import PolicyError
+from unconstrain.fitting.foreign import fit_regressor, goes_on, predict_with
 
 Floats = NDArray[np.float64]
-
-GROWS = {"n_estimators", "max_leaf_nodes"}
-"""Parameters of regressors whose warm start adds trees to those of earlier targets, which would be wrong ever after."""
-
-
-def as_multi_output(regressor: Any, n_actions: int) -> Any:
-    """Return a regressor that takes several targets: itself, or one of it for each.
-
-    Parameters
-    ----------
-    regressor : estimator
-        Of scikit-learn's interface.
-    n_actions : int
-        How many targets.
-
-    Returns
-    -------
-    estimator
-        Not fitted.
-    """
-    last = regressor[-1] if isinstance(regressor, Pipeline) else regressor
-    # Networks take several targets, though their tags do not say so.
-    is_network = isinstance(last, MLPRegressor)
-    if n_actions == 1 or is_network or get_tags(regressor).target_tags.multi_output:
-        return regressor
-    return MultiOutputRegressor(regressor)
-
-
-def find_weight_option(regressor: Any) -> str | None:
-    """Find the argument of a regressor's `fit` that takes sample weights.
-
-    Parameters
-    ----------
-    regressor : estimator
-        As `as_multi_output` returns it.
-
-    Returns
-    -------
-    str or None
-        Its name, which in pipelines is that of the last step's; None where there is none.
-    """
-    prefix, inner = "", regressor
-    while isinstance(inner, MultiOutputRegressor | TransformedTargetRegressor | Pipeline):
-        if isinstance(inner, Pipeline):
-            prefix, inner = f"{prefix}{inner.steps[-1][0]}__", inner.steps[-1][1]
-        else:
-            inner = inner.estimator if isinstance(inner, MultiOutputRegressor) else inner.regressor
-            if isinstance(inner, Pipeline):  # neither of the two hands on what a pipeline would understand
-                return None
-    takes = "sample_weight" in inspect.signature(inner.fit).parameters
-    return f"{prefix}sample_weight" if takes else None
-
-
-def goes_on(regressor: Any) -> bool:
-    """Tell whether a regressor can begin a fit where its last one ended, whatever the targets were then.
-
-    Parameters
-    ----------
-    regressor : estimator
-        Of scikit-learn's interface.
-
-    Returns
-    -------
-    bool
-        True for those that descend and have `warm_start`, such as networks; not for those that would add trees.
-    """
-    last = regressor[-1] if isinstance(regressor, Pipeline) else regressor
-    options = last.get_params(deep=False) if hasattr(last, "get_params") else {}
-    return "warm_start" in options and not GROWS & set(options)
-
-
-def fit_regressor(regressor: Any, Z: Floats, Y: Floats, weights: Floats | None) -> Any:
-    """Fit a regressor.
-
-    Parameters
-    ----------
-    regressor : estimator
-        Is fitted itself.
-    Z : ndarray of shape (N, n)
-        States.
-    Y : ndarray of shape (N, d)
-        Targets.
-    weights : ndarray of shape (N,), optional
-        Of the samples.
-
-    Returns
-    -------
-    estimator
-        The regressor.
-
-    Raises
-    ------
-    PolicyError
-        The regressor refuses; its own sentence is passed on.
-    """
-    targets = Y[:, 0] if Y.shape[1] == 1 else Y
-    option = None if weights is None else find_weight_option(regressor)
-    options = {} if option is None else {option: weights}
-    try:
-        with warnings.catch_warnings():
-            # A fit that is but a step on the way need not converge, and its regressor warns each time.
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            regressor.fit(Z, targets, **options)
-    except (ValueError, TypeError) as error:
-        sentence = " ".join(str(error).split())
-        raise PolicyError(f"the {type(regressor).__name__} cannot be fitted: {sentence:.300}") from error
-    return regressor
 
 
 @dataclass
@@ -177,15 +64,24 @@ class Halves:
         PolicyError
             The regressor cannot be fitted.
         """
-        N = len(targets)
-        is_first = self._deal(N)
-        P = np.empty_like(targets)
-        for half, learns in enumerate((is_first, ~is_first)):
-            weights = None if self.weights is None else self.weights[learns]
-            fitted = fit_regressor(self._make(half), self.states[learns], targets[learns], weights)
-            P[~learns] = np.reshape(fitted.predict(self.states[~learns]), (-1, targets.shape[1]))
-            self.n_fits += 1
-        return P
+        return self._cross(targets, self._deal(len(targets)), self._make)
+
+    def predict_across(self, targets: Floats, is_first: NDArray[np.bool_]) -> Floats:
+        """Predict each sample by a regressor that was fitted to the targets of a half that it is not in.
+
+        Parameters
+        ----------
+        targets : ndarray of shape (N, d)
+            Of all samples.
+        is_first : ndarray of shape (N,), bool
+            Which samples are in the first half.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            Predictions.
+        """
+        return self._cross(targets, is_first, lambda half: clone(self.regressor))
 
     def finish(self, targets: Floats) -> Any:
         """Fit the regressor to all samples.
@@ -202,6 +98,15 @@ class Halves:
         """
         self.n_fits += 1
         return fit_regressor(clone(self.regressor), self.states, targets, self.weights)
+
+    def _cross(self, targets: Floats, is_first: NDArray[np.bool_], make: Callable[[int], Any]) -> Floats:
+        P = np.empty_like(targets)
+        for half, learns in enumerate((is_first, ~is_first)):
+            weights = None if self.weights is None else self.weights[learns]
+            fitted = fit_regressor(make(half), self.states[learns], targets[learns], weights)
+            P[~learns] = predict_with(fitted, self.states[~learns], targets.shape[1])
+            self.n_fits += 1
+        return P
 
     def _deal(self, N: int) -> NDArray[np.bool_]:
         if self._first is not None:

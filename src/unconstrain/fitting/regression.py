@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.errors import PolicyError
+from unconstrain.fitting.foreign import name_regressor, predict_with
 from unconstrain.fitting.model import LinearModel
 
 Floats = NDArray[np.float64]
@@ -79,7 +80,7 @@ class Regression:
 
     def evaluate(self, X: Floats, w: Regressed) -> Floats:
         """Evaluate the policy; see `Model.evaluate`."""
-        P = np.asarray(w.regressor.predict(X), dtype=np.float64).reshape(len(X), self.n_actions)
+        P = predict_with(w.regressor, np.asarray(X, dtype=np.float64), self.n_actions)
         return P if w.trend is None else P + w.trend(X)
 
     def lay_out(self, X: Floats) -> Floats:
@@ -89,6 +90,6 @@ class Regression:
     def compile(self, w: Regressed) -> NoReturn:
         """Raise `PolicyError`: a regressor's own `predict` is all there is."""
         raise PolicyError(
-            f"a policy made of a {type(w.regressor).__name__} cannot be compiled: call predict, or fit a "
+            f"a policy made of a {name_regressor(w.regressor)} cannot be compiled: call predict, or fit a "
             "LocallyLinearPolicy to policy.predict(states) of many states, which can"
         )

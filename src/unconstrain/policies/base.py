@@ -114,6 +114,8 @@ class Policy(RegressorMixin, BaseEstimator):
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
         space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
         fresh.actions_are_scalars_ = scalars
+        order = samples.order()
+        samples = samples if order is None else samples.select(order)
         fresh.learn(samples, space, noise)
         return self._become(fresh)
 
@@ -413,7 +415,12 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         belief = self._belief("free_probability")
         samples, _ = check_input(copy(self), X, y, groups, None, projections, first=False)
-        return infer(self.model_, belief, in_units(self.model_.scale, samples)).free
+        samples, order = in_units(self.model_.scale, samples), samples.order()
+        if order is None:
+            return infer(self.model_, belief, samples).free
+        free = np.empty(len(order))
+        free[order] = infer(self.model_, belief, samples.select(order)).free
+        return free
 
     def observe(self, samples: Samples) -> Observation:
         """Say what samples show of the policy: as inferred, or else along their motion.

@@ -10,12 +10,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from sklearn.base import is_regressor
+from sklearn.base import BaseEstimator, is_regressor
+from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_choice, check_whole
-from unconstrain.errors import PolicyError
+from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import Record, Solution
-from unconstrain.fitting.halves import Halves, as_multi_output, find_weight_option
+from unconstrain.fitting.foreign import as_multi_output, find_weight_option
+from unconstrain.fitting.halves import Halves
 from unconstrain.fitting.in_space import in_units
 from unconstrain.fitting.observation import unknown
 from unconstrain.fitting.region import Region, find_unit
@@ -31,8 +33,10 @@ from unconstrain.spaces import Space
 
 PRIORS = ("linear", "zero")
 
-FEWEST_FITS = 10
-"""All free, one round from each start, one more, and the fits to all samples."""
+FEWEST_SAMPLES = 2
+
+FEWEST_FITS = 20
+"""Of all free and three runs one round each, of each of these episodes held out, and two fits to all samples: 18."""
 
 
 class RegressorPolicy(Policy):
@@ -56,7 +60,7 @@ class RegressorPolicy(Policy):
         shows, and far from all samples: the linear policy that `ParametricPolicy` learns by the same risk, or zero, the
         regressor alone. With the latter too the rounds begin at the linear policy.
     max_fits : int
-        How often the regressor is fitted at most, to halves of the samples mostly; at least 10. Fewer are enough where
+        How often the regressor is fitted at most, to halves of the samples mostly; at least 20. Fewer are enough where
         rounds gain nothing.
     space : Space, optional
         What the states are; see `unconstrain.spaces`. By default what the demonstrations say, or numbers.
@@ -83,9 +87,9 @@ class RegressorPolicy(Policy):
     --------
     >>> import numpy as np, unconstrain as uc
     >>> from sklearn.ensemble import ExtraTreesRegressor
-    >>> X = np.random.default_rng(0).uniform(-1, 1, size=(500, 2))
+    >>> X = np.random.default_rng(0).uniform(-1, 1, size=(1000, 2))
     >>> Pi = np.sin(3 * X)                                        # the unconstrained policy
-    >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(500, 1, 2)))
+    >>> N = uc.constraints.projection(np.random.default_rng(1).normal(size=(1000, 1, 2)))
     >>> U = np.einsum("nij,nj->ni", N, Pi)                        # what is recorded
     >>> policy = uc.RegressorPolicy(ExtraTreesRegressor(min_samples_leaf=3, random_state=0)).fit(X, U)
     >>> bool(uc.metrics.unconstrained_policy_error(Pi, policy.predict(X)) < 0.15 * Pi.var(axis=0).sum())
@@ -121,6 +125,10 @@ class RegressorPolicy(Policy):
         shown = in_units(setting.scale, samples)
         if not setting.counted.all():
             shown = shown.select(np.flatnonzero(setting.counted))
+        if len(shown.actions) < FEWEST_SAMPLES:
+            raise DataError(
+                f"only one of {len(samples.actions)} samples moves, and the others say nothing of the policy"
+            )
         shown = shown._replace(states=setting.states)
         d = shown.actions.shape[1]
         regressor = as_multi_output(self.regressor, d)
@@ -161,19 +169,22 @@ class RegressorPolicy(Policy):
         super().check_options()
         check_choice(self.prior, "prior", PRIORS)
         check_whole(self.max_fits, "max_fits", least=FEWEST_FITS)
-        if not (hasattr(self.regressor, "fit") and hasattr(self.regressor, "predict")) or isinstance(
-            self.regressor, type
-        ):
+        if self.random_state is not None:
+            check_whole(self.random_state, "random_state", least=0)
+        if not hasattr(self.regressor, "fit") or isinstance(self.regressor, type):
             raise PolicyError(
-                "regressor must be an estimator with fit and predict, such as ExtraTreesRegressor(), got "
-                f"{self.regressor!r:.60}"
+                f"regressor must be an estimator, such as ExtraTreesRegressor(), got {self.regressor!r:.60}"
             )
+        name = type(self.regressor).__name__
+        if not isinstance(self.regressor, BaseEstimator):
+            raise PolicyError(f"a {name} is no estimator of scikit-learn's: derive it from BaseEstimator")
         if not is_regressor(self.regressor):
-            raise PolicyError(f"a {type(self.regressor).__name__} is no regressor: actions are numbers")
+            raise PolicyError(f"a {name} is no regressor: actions are numbers")
 
     @property
     def regressor_(self) -> Any:
         """The fitted regressor."""
+        check_is_fitted(self)
         return self.solution_.w.regressor
 
     def _complete(self, completing: Completing) -> tuple[Completed, Solution | None]:

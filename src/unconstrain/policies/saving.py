@@ -44,8 +44,8 @@ def load_policy(path: str | PathLike[str], *, trusted: Iterable[Any] = ()) -> Po
         The file.
     trusted : classes and functions, or str, optional
         Those of your own that the policy holds: a transformer, a function given to one. The file has only their
-        names, so give the classes and functions themselves. What a regressor of a `RegressorPolicy` is made of, beside
-        what skops knows to be harmless, is given by name, as the error says that asks for it.
+        names, so give the classes and functions themselves. What a regressor of a `RegressorPolicy` is made of is
+        given by name, as the error says that asks for it.
 
     Returns
     -------

@@ -32,7 +32,7 @@ import numpy as np
 from unconstrain.errors import UnconstrainError
 from unconstrain.storage.archive import is_storable
 from unconstrain.storage.classes import check_restored, class_of, name_of, without_circumstances
-from unconstrain.storage.estimators import dump, is_foreign_regressor, list_untrusted, restore
+from unconstrain.storage.estimators import dump, is_foreign_regressor, list_types, restore
 
 DEEPEST = 60
 """Containers and objects within each other, at most."""
@@ -136,7 +136,7 @@ def decode(tree: Any, arrays: dict[str, np.ndarray], trusted: Iterable[Any] = ()
     unknown += [
         name
         for content in dict.fromkeys(_regressors(tree))
-        for name in list_untrusted(arrays[content])
+        for name in list_types(arrays[content])
         if name not in named
     ]
     if unknown:

@@ -28,6 +28,7 @@ def test_the_example_runs(example, tmp_path, monkeypatch):
     if "torch" in example.read_text(encoding="utf-8"):
         pytest.importorskip("torch")
     monkeypatch.chdir(tmp_path)
+    plt.close("all")  # of other tests
     monkeypatch.setattr("sys.argv", [example.name])
     with plt.rc_context({"backend": "agg"}), threadpool_limits(1):
         runpy.run_path(str(example), run_name="__main__")

@@ -8,7 +8,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
@@ -60,6 +60,9 @@ class Policy(RegressorMixin, BaseEstimator):
     risks: ClassVar[tuple[str, ...]] = ("adaptive", "inconsistency", "direct")
     with_streams: ClassVar[str] = "needs all samples at once, and a stream is read block by block"
     """What to say to whoever gives a policy of this kind to `fit_stream`."""
+    keeps_order: ClassVar[bool] = False
+    """Whether an episode whose rows come back after others counts as another. A stream cannot put them together, so
+    for policies that learn from streams that is so in memory too."""
 
     risk: str
     space: Space | None
@@ -114,7 +117,7 @@ class Policy(RegressorMixin, BaseEstimator):
         samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
         space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
         fresh.actions_are_scalars_ = scalars
-        order = samples.order()
+        order = self._order(samples)
         samples = samples if order is None else samples.select(order)
         fresh.learn(samples, space, noise)
         return self._become(fresh)
@@ -415,7 +418,7 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         belief = self._belief("free_probability")
         samples, _ = check_input(copy(self), X, y, groups, None, projections, first=False)
-        samples, order = in_units(self.model_.scale, samples), samples.order()
+        samples, order = in_units(self.model_.scale, samples), self._order(samples)
         if order is None:
             return infer(self.model_, belief, samples).free
         free = np.empty(len(order))
@@ -717,6 +720,9 @@ class Policy(RegressorMixin, BaseEstimator):
 
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
+
+    def _order(self, samples: Samples) -> NDArray[np.intp] | None:
+        return None if self.keeps_order else samples.order()
 
     def _without_stability(self) -> Self:
         fresh = copy(self)

@@ -47,6 +47,7 @@ class LinearPolicy(Policy):
     """
 
     risks: ClassVar[tuple[str, ...]] = RISKS
+    keeps_order: ClassVar[bool] = True
 
     alpha: float | str
     model_: LinearModel

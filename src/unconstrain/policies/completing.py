@@ -2,8 +2,9 @@
 
 Fits are few, so all that costs none is done beside them: a linear policy with the same risk says where to start, and
 noise and contact are found anew from every round's held-out predictions. With the adaptive risk two starts are
-tried for a few rounds, ordinary regression and the linear policy, and the likelier goes on. "All free" is kept
-unless another explains clearly more than residuals with heavy tails would (`fitting.outliers`).
+tried for a few rounds, ordinary regression and the linear policy, and the likelier goes on with more noise. Which is
+likelier is judged by whole episodes held out. "All free" is kept unless another explains clearly more than residuals
+with heavy tails would (`fitting.outliers`).
 """
 
 from collections.abc import Callable
@@ -48,6 +49,7 @@ FIRST_ROUNDS = 4
 """Rounds from each start, after which the likelier goes on alone; fewer where fits are."""
 
 FITS_A_ROUND, RUNS = 2, 4
+"""The latter: all free, two starts, and one warmed again. Noise in the speed is tried where fits are left."""
 
 FEWEST_EPISODES, BLOCKS = 4, 10
 """Of which halves are held out, and contiguous blocks that stand for episodes where there are fewer."""
@@ -308,7 +310,8 @@ class Completing:
     def _vary_speed(self, best: Rounds) -> Rounds | None:
         """Go on from the end of other rounds with noise in the speed, where that explains clearly more."""
         tally = self._tally(best)
-        if self.samples.actions.shape[1] == 1 or tally.evidence <= INDEPENDENT:
+        is_affordable = self.halves.n_fits + FITS_A_ROUND <= self.most_fits
+        if self.samples.actions.shape[1] == 1 or tally.evidence <= INDEPENDENT or not is_affordable:
             return None
         assert best.predictions is not None
         belief = best.rule.settle(best.predictions)

@@ -36,7 +36,7 @@ PRIORS = ("linear", "zero")
 FEWEST_SAMPLES = 2
 
 FEWEST_FITS = 20
-"""Of all free and three runs one round each, of each of these episodes held out, and two fits to all samples: 18."""
+"""A round each of all free and three runs, episodes held out of these, and two fits to all samples, and two more."""
 
 
 class RegressorPolicy(Policy):

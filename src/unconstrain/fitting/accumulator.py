@@ -5,8 +5,10 @@ time in threads. A cluster gives each worker an empty copy, and merges what come
 """
 
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -469,11 +471,10 @@ class Accumulator:
         solution = Solution(parameters, alpha, alphas, held_out_risk, *counts, regions=total.regions)
         if self.belief is None:
             return solution
-        states = total.tallies[0].counts.states
         return replace(
             solution,
             belief=replace(self.belief, w=parameters),
-            free_share=float(states[0] / states.sum()),
+            free_share=total.tallies[0].free_share,
             evidence=total.tallies[0].evidence,
             record=self.record,
         )
@@ -526,10 +527,7 @@ class Accumulator:
             rows = fold == k
             part = samples.select(rows)
             tallies.append(infer(self.model, beliefs[k], part).tally)
-        total = tallies[0]
-        for tally in tallies[1:]:
-            total = total + tally
-        return total
+        return reduce(operator.add, tallies)
 
     def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Moments:
         X, weights = samples.states, samples.weights

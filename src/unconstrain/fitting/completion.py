@@ -126,8 +126,7 @@ class ByBelief:
 
     def judge(self, P: Floats) -> float:
         """Return the log-likelihood of a sample under the noise and contact that fit P; see `Rule`."""
-        tally = judge(P, self.settle(P), self.samples).tally
-        return tally.log_likelihood / tally.n_samples
+        return judge(P, self.settle(P), self.samples).tally.mean
 
     def settle(self, P: Floats) -> Belief:
         """Find the noise and contact that held-out predictions suggest, however far the noise has been lowered.

@@ -121,6 +121,21 @@ class Tally:
         )
 
     @property
+    def mean(self) -> float:
+        """Log-likelihood of a sample."""
+        return self.log_likelihood / self.n_samples
+
+    @property
+    def free_share(self) -> float:
+        """Share of the samples that were free."""
+        return float(self.counts.states[0] / self.counts.states.sum())
+
+    @property
+    def size(self) -> float:
+        """How many times larger the policy is than what is recorded, root mean square."""
+        return float(np.sqrt(self.meant / self.shown)) if self.shown > 0 else 0.0
+
+    @property
     def evidence(self) -> float:
         """How many independent samples one is worth: `(1 - φ) / (1 + φ)` for residuals of correlation φ in a row."""
         correlation = np.clip(self.echo / self.energy, 0.0, MOST_CORRELATED) if self.energy > 0 else 0.0

@@ -27,9 +27,10 @@ from unconstrain.fitting.accumulator import Accumulator, Record, Solution
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally
 from unconstrain.fitting.drift import Drift
+from unconstrain.fitting.gains import INDEPENDENT, NOTICEABLE, clear_gain
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
-from unconstrain.fitting.plausible import check_scale, is_plausible
+from unconstrain.fitting.plausible import check_scale
 from unconstrain.fitting.solve import EpisodeFolds
 
 COOLING = 0.8
@@ -72,16 +73,6 @@ WARMTH = 10.0**2
 """By what the variance found is multiplied for the run that starts where the likelier of two ended. In many dimensions
 a free sample shows directions that no other does, is far from a policy that has not learnt them, and so is taken for
 constrained for ever; with more noise a policy that is nearly right takes it for free."""
-
-INDEPENDENT = 0.5
-"""Evidence of a sample from which on likelihoods tell kinds of noise apart: dependent residuals look like anything."""
-
-NOTICEABLE = 0.03
-"""Gain in held-out log-likelihood, per independent sample, for which contact is taken to be there. Residuals of a model
-that does not quite fit change slowly along an episode, and a hundred samples then tell no more than one."""
-
-DECISIVE = 20.0
-"""The same of all samples together."""
 
 SHORT_RUN, SHORTEST_RUN = 8, 2
 """Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
@@ -134,11 +125,6 @@ class Run:
         """What that pass has found."""
         assert self.accepted is not None
         return self.accepted.total.tallies[0]
-
-    @property
-    def size(self) -> float:
-        """How many times larger the policy is than what is recorded, root mean square."""
-        return float(np.sqrt(self.tally.meant / self.tally.shown)) if self.tally.shown > 0 else 0.0
 
     @property
     def chooses_alpha(self) -> bool:
@@ -370,12 +356,12 @@ class Inference:
         self.history.append(
             {
                 "run": run.name,
-                "log_likelihood": tally.log_likelihood / tally.n_samples,
+                "log_likelihood": tally.mean,
                 "comparable": run.is_climbing and run.since_cool > SETTLING,
                 "accepted": run.accepted is done,
                 "noise": float(np.sqrt(done.belief.noise.action)),
                 "speed_noise": float(np.sqrt(done.belief.noise.speed)),
-                "free_share": float(tally.counts.states[0] / tally.counts.states.sum()),
+                "free_share": tally.free_share,
                 "evidence": tally.evidence,
                 "alpha": run.alpha,
             }
@@ -434,13 +420,10 @@ class Inference:
 
     def _gain(self, run: Run, other: Run) -> float:
         """Compute by how much a run explains more than another, per sample; 0 where that is not clear."""
-        n_samples = run.tally.n_samples
         gain = self.likelihoods[run.name] - self.likelihoods[other.name]
         if run.name == SPEED:  # what was held out may lie far off, and then a wider noise explains it
-            gain = min(gain, (run.log_likelihood - other.log_likelihood) / n_samples)
-        gain *= min(run.tally.evidence / INDEPENDENT, 1.0)
-        plausible = is_plausible(run.size, self.blank.model.n_actions)
-        return gain if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE else 0.0
+            gain = min(gain, (run.log_likelihood - other.log_likelihood) / run.tally.n_samples)
+        return clear_gain(gain, run.tally, self.blank.model.n_actions)
 
     def _begin_comparison(self, runs: list[Run]) -> None:
         self.compared = list(runs)
@@ -454,7 +437,7 @@ class Inference:
             self.noises = [replace(noise, action=max(noise.action, self._floor)) for noise in found]
             self.stage = "likelihood"
             return
-        self.likelihoods |= {run.name: tally.log_likelihood / tally.n_samples for run, tally in results}
+        self.likelihoods |= {run.name: tally.mean for run, tally in results}
         self.repeated |= {
             run.name: noise.action * tally.repeated
             for (run, tally), noise in zip(results, self.noises, strict=True)

@@ -13,9 +13,10 @@ until the policy stays. So every maximisation is a regression by Gaussian proces
 likelihood of folds that are left out of each (`held_out`), "all free" unless another is clearly likelier.
 """
 
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -24,20 +25,17 @@ from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
 from unconstrain.fitting.drift import Drift
+from unconstrain.fitting.gains import clear_gain
 from unconstrain.fitting.inference import (
-    DECISIVE,
     FREE,
-    INDEPENDENT,
     INFERRED,
     LARGEST_SPEED,
     LEAST_NOISE,
-    NOTICEABLE,
     Inference,
 )
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import Expanded, Observation, observe
-from unconstrain.fitting.plausible import is_plausible
 from unconstrain.fitting.solve import EpisodeFolds
 from unconstrain.gaussian_process.conditioning import Conditioned, condition_on_all, place_features
 from unconstrain.gaussian_process.evidence import Evidence, choose, learn_kernel
@@ -208,11 +206,6 @@ class End:
     tally: Tally
     history: list[dict[str, Any]]
 
-    @property
-    def size(self) -> float:
-        """How many times larger the policy is than what is recorded, root mean square."""
-        return float(np.sqrt(self.tally.meant / self.tally.shown)) if self.tally.shown > 0 else 0.0
-
 
 def learn_published(problem: Problem, risk: str) -> Learnt:
     """Learn by a risk that observes every sample alike.
@@ -321,10 +314,10 @@ def _pass_on(problem: Problem, model: Any, name: str, belief: Belief, first: Any
         history.append(
             {
                 "run": name,
-                "log_likelihood": tally.log_likelihood / tally.n_samples,
+                "log_likelihood": tally.mean,
                 "noise": float(np.sqrt(belief.noise.action)),
                 "speed_noise": float(np.sqrt(belief.noise.speed)),
-                "free_share": float(tally.counts.states[0] / tally.counts.states.sum()),
+                "free_share": tally.free_share,
                 "evidence": tally.evidence,
                 "kernel": str(evidence.kernel),
             }
@@ -345,11 +338,8 @@ def _compare(problem: Problem, model: Any, ends: dict[str, End]) -> Learnt:
     }
     best = ends[FREE]
     for end in ends.values():
-        n_samples = end.tally.n_samples
         gain = likelihoods[end.name] - likelihoods[best.name]
-        gain *= min(end.tally.evidence / INDEPENDENT, 1.0)
-        plausible = is_plausible(end.size, problem.samples.actions.shape[1])
-        if plausible and gain > NOTICEABLE and gain * n_samples > DECISIVE:
+        if clear_gain(gain, end.tally, problem.samples.actions.shape[1]) > 0:
             best = end
     likelihoods = dict(sorted(likelihoods.items(), key=lambda item: item[0] != best.name))
     process = held[best.name].widen(best.conditioned.process)
@@ -371,11 +361,8 @@ def _held_out_likelihood(problem: Problem, model: Any, end: End, processes: Mapp
             infer(model, replace(belief, w=processes[k], noise=noise), part).tally
             for k, part in parts.items()
         ]
-        total = tallies[0]
-        for tally in tallies[1:]:
-            total = total + tally
-        return total
+        return reduce(operator.add, tallies)
 
     found = add_up(belief.noise).squares.estimate(_kinds(belief))
     total = add_up(replace(found, action=max(found.action, problem.floor)))
-    return total.log_likelihood / total.n_samples
+    return total.mean

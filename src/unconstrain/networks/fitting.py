@@ -199,7 +199,6 @@ def _conclude(
     repeated = np.mean([belief.noise.action * each.repeated for each in held_out if each is not None])
     history = tuple(entry for each in members for candidate in each.values() for entry in candidate.history)
     regression = Solution(together("regression"), np.nan, n_samples=survey.n_samples, usual_speed=speed)
-    states = total.counts.states
     return Solution(
         w,
         np.nan,
@@ -207,7 +206,7 @@ def _conclude(
         None,
         *counts,
         belief=belief,
-        free_share=float(states[0] / states.sum()),
+        free_share=total.free_share,
         evidence=total.evidence,
         record=Record(likelihoods, history, float(repeated), regression),
         regions=survey.regions,

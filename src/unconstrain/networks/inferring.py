@@ -25,20 +25,17 @@ import numpy as np
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Found, Tally, infer
 from unconstrain.fitting.drift import Drift
+from unconstrain.fitting.gains import NOTICEABLE, clear_gain
 from unconstrain.fitting.inference import (
     AGAIN,
     COOLING,
-    DECISIVE,
     FREE,
     FROM_DIRECT,
     FROM_INCONSISTENCY,
-    INDEPENDENT,
     LEAST_NOISE,
-    NOTICEABLE,
     WARMTH,
 )
 from unconstrain.fitting.noise import Noise
-from unconstrain.fitting.plausible import is_plausible
 from unconstrain.networks.learner import (
     Learner,
     Stopping,
@@ -237,7 +234,7 @@ class Member:
             belief, _ = self._pass(learner, belief, cooling=False)
             tally = self._ask(learner.shards.held_out, belief).tally
             history.append(_describe(name, belief, tally))
-            stop.look(-tally.log_likelihood / tally.n_samples, (belief, tally))
+            stop.look(-tally.mean, (belief, tally))
             if stop.is_done:
                 break
         best, tally = stop.kept
@@ -320,19 +317,14 @@ def choose(members: Sequence[dict[str, Candidate]], n_actions: int) -> tuple[str
     """
     names = [name for name in NAMES if all(_is_compared(each.get(name)) for each in members)]
     tallies = {name: _total([each[name].tally for each in members]) for name in names}
-    likelihoods = {name: tally.log_likelihood / tally.n_samples for name, tally in tallies.items()}
+    likelihoods = {name: tally.mean for name, tally in tallies.items()}
 
     def gain(name: str, other: str) -> float:
-        tally = tallies[name]
-        gained = (likelihoods[name] - likelihoods[other]) * min(tally.evidence / INDEPENDENT, 1.0)
-        size = np.sqrt(tally.meant / tally.shown) if tally.shown > 0 else 0.0
-        clear = gained > NOTICEABLE and gained * tally.n_samples > DECISIVE
-        return gained if clear and is_plausible(float(size), n_actions) else 0.0
+        return clear_gain(likelihoods[name] - likelihoods[other], tallies[name], n_actions)
 
     best = max(names, key=lambda name: gain(name, FREE))
     best = best if gain(best, FREE) > 0 else FREE
     for name in names:
-        # What a gain counts hangs on the evidence of the run that gains.
         best = name if gain(name, FREE) > 0 and gain(name, best) > 0 else best
     # Whether there is contact was decided for the linear policy by itself; what is left is which predicts better.
     if LINEAR in names and likelihoods[LINEAR] - likelihoods[best] > NOTICEABLE:
@@ -353,15 +345,14 @@ def _expected_loss(found: Found, shard: Shard, noise: float) -> Callable[[Any, S
 
 
 def _describe(name: str, belief: Belief, tally: Tally) -> dict[str, Any]:
-    states = tally.counts.states
     return {
         "run": name,
-        "log_likelihood": tally.log_likelihood / tally.n_samples,
+        "log_likelihood": tally.mean,
         "comparable": not belief.is_cooling,
         "accepted": True,
         "noise": float(np.sqrt(belief.noise.action)),
         "speed_noise": 0.0,
-        "free_share": float(states[0] / states.sum()),
+        "free_share": tally.free_share,
         "evidence": tally.evidence,
     }
 

@@ -58,7 +58,7 @@ class Policy(RegressorMixin, BaseEstimator):
     """
 
     risks: ClassVar[tuple[str, ...]] = ("adaptive", "inconsistency", "direct")
-    with_streams: ClassVar[str] = "needs all samples at once, and a stream is read block by block"
+    why_no_stream: ClassVar[str] = "needs all samples at once, and a stream is read block by block"
     """What to say to whoever gives a policy of this kind to `fit_stream`."""
     keeps_order: ClassVar[bool] = False
     """Whether an episode whose rows come back after others counts as another. A stream cannot put them together, so

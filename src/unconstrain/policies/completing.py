@@ -20,13 +20,12 @@ from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.completion import ByBelief, ByRisk, Rounds, find_noise
 from unconstrain.fitting.contact import Belief, Tally, judge
 from unconstrain.fitting.drift import Drift
+from unconstrain.fitting.gains import INDEPENDENT, clear_gain
 from unconstrain.fitting.halves import Halves
 from unconstrain.fitting.inference import (
     AGAIN,
-    DECISIVE,
     FREE,
     FROM_DIRECT,
-    INDEPENDENT,
     LEAST_NOISE,
     SPEED,
     SPEED_AT_FIRST,
@@ -35,7 +34,6 @@ from unconstrain.fitting.inference import (
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.observation import observe, unknown
 from unconstrain.fitting.outliers import find_heavy_tailed
-from unconstrain.fitting.plausible import is_plausible
 from unconstrain.fitting.regression import Trend
 from unconstrain.policies.inferred import finds_no_contact
 from unconstrain.policies.parametric import ParametricPolicy
@@ -60,7 +58,7 @@ FIXED_DECAY = 1e-4
 CLEAR, PLAIN = 0.07, 1.5
 """Gain in log-likelihood of an independent sample for which contact is taken to be there, and of any sample where the
 linear policy finds contact too. For models that are linear in their parameters the former is less
-(`inference.NOTICEABLE`): what regressors miss looks more like contact. Both were chosen on limit cycles, the arm,
+(`gains.NOTICEABLE`): what regressors miss looks more like contact. Both were chosen on limit cycles, the arm,
 reaches and handwriting, of which those that are free gained up to 0.05 and 1.1, those that are not 0.08 and 2.8."""
 
 
@@ -329,16 +327,15 @@ class Completing:
         that holds for linear policies (`fitting.inference`).
         """
         assert one.apart_tally is not None
-        gain, d = one.apart - free.apart, self.samples.actions.shape[1]
-        if linear_agrees and gain > PLAIN:
-            return _is_clear(gain, one.apart_tally, d)
-        return _is_clear(gain * _worth(one.apart_tally), one.apart_tally, d) and self._beats(one, free)
+        gain, tally, d = one.apart - free.apart, one.apart_tally, self.samples.actions.shape[1]
+        if linear_agrees and clear_gain(gain, tally, d, least=PLAIN, discounted=False) > 0:
+            return True
+        return clear_gain(gain, tally, d, least=CLEAR) > 0 and self._beats(one, free)
 
     def _beats(self, one: Rounds, other: Rounds) -> bool:
         """Whether one explains clearly more of held-out samples than another."""
-        tally = self._tally(one)
-        gain = (one.score - other.score) * _worth(tally)
-        return _is_clear(gain, tally, self.samples.actions.shape[1])
+        d = self.samples.actions.shape[1]
+        return clear_gain(one.score - other.score, self._tally(one), d, least=CLEAR) > 0
 
     def _tally(self, rounds: Rounds) -> Tally:
         assert rounds.predictions is not None
@@ -381,14 +378,3 @@ def _as_trend(policy: ParametricPolicy) -> Trend:
 
 def _apart(rounds: Rounds) -> float:
     return rounds.apart
-
-
-def _worth(tally: Tally) -> float:
-    """How many independent samples one is worth, at most one."""
-    return min(tally.evidence / INDEPENDENT, 1.0)
-
-
-def _is_clear(gain: float, tally: Tally, d: int) -> bool:
-    """Whether a gain per sample is enough, and the policy not too large."""
-    size = np.sqrt(tally.meant / tally.shown) if tally.shown > 0 else 0.0
-    return is_plausible(float(size), d) and gain > CLEAR and gain * tally.n_samples > DECISIVE

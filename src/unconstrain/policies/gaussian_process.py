@@ -243,11 +243,10 @@ def _solve(learnt: Learnt, counted: Accumulator, problem: Problem) -> Solution:
     )
     if learnt.belief is None or learnt.tally is None:
         return solution
-    states = learnt.tally.counts.states
     return replace(
         solution,
         belief=learnt.belief,
-        free_share=float(states[0] / states.sum()),
+        free_share=learnt.tally.free_share,
         evidence=learnt.tally.evidence,
         record=Record(dict(learnt.log_likelihoods or {}), learnt.history, regression=regression),
     )

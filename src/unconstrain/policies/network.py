@@ -93,7 +93,7 @@ class TorchPolicy(Policy):
     >>> actions, spread = policy.predict(X, return_std=True)    # doctest: +SKIP
     """
 
-    with_streams = (
+    why_no_stream = (
         "reads a stream itself, again and again, with policy.fit(uc.open(...)), and not by `fit_stream`"
     )
 

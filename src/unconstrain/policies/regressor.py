@@ -224,10 +224,9 @@ def _conclude(recorded: Samples, shown: Samples, completed: Completed, w: Regres
     )
     if completed.belief is None or completed.tally is None:
         return solution
-    states = completed.tally.counts.states
     return replace(
         solution,
         belief=replace(completed.belief, w=w),
-        free_share=float(states[0] / states.sum()),
+        free_share=completed.tally.free_share,
         evidence=completed.tally.evidence,
     )

@@ -175,7 +175,7 @@ def open_for(
     if not isinstance(policy, LinearPolicy):
         if isinstance(policy, Policy):
             raise PolicyError(
-                f"a {type(policy).__name__} {policy.with_streams}: a ParametricPolicy and a LocallyLinearPolicy learn "
+                f"a {type(policy).__name__} {policy.why_no_stream}: a ParametricPolicy and a LocallyLinearPolicy learn "
                 "from it, with any risk but the adaptive one in one pass"
             )
         raise PolicyError(f"policy must be one of unconstrain's, got {policy!r:.80}")

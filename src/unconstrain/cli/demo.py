@@ -41,7 +41,7 @@ def demo(out: Path, overwrite: bool) -> None:
     for path in (picture, table, data, others):
         outputs.check_new(path, "out", overwrite=overwrite)
     from unconstrain import demo as experiment
-    from unconstrain import plot
+    from unconstrain import datasets, plot
     from unconstrain.policies.inferred import describe_inferred
     from unconstrain.recordings.text import write_csv
 
@@ -67,6 +67,8 @@ def demo(out: Path, overwrite: bool) -> None:
         f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --episode episode --model rbf "
         f"--width {experiment.WIDTH} --out {reporting.shell_word(out / 'policy.skops')} --overwrite"
     )
+    reporting.say("\nor from a hand that wipes boards, with a force sensor, which ships with the package:")
+    reporting.say(f"  unconstrain inspect {reporting.shell_word(datasets.path('wiping.csv'))}")
 
 
 def _write_markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], path: Path) -> None:

@@ -40,8 +40,8 @@ def demo(out: Path, overwrite: bool) -> None:
         raise UnconstrainError(f"cannot make the folder {out}: {error.strerror}") from error
     for path in (picture, table, data, others):
         outputs.check_new(path, "out", overwrite=overwrite)
-    from unconstrain import demo as experiment
     from unconstrain import datasets, plot
+    from unconstrain import demo as experiment
     from unconstrain.policies.inferred import describe_inferred
     from unconstrain.recordings.text import write_csv
 

@@ -134,8 +134,9 @@ def fit(
     policy.save(out, resumable=resumable)
     if figure is not None:
         from unconstrain import plot
+        from unconstrain.plot import figures
 
-        plot.save(plot.policy_figure(policy, demos), figure)
+        plot.save(figures.draw_policy(policy, demos), figure)
     comparing.describe(comparison, evaluation)
     if stable_at is not None:
         stabilizing.describe(policy)

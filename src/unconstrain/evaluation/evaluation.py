@@ -22,6 +22,7 @@ from unconstrain.evaluation.scores import Score, find_typical, gaussian_log_like
 from unconstrain.evaluation.verdict import Verdict, conclude
 from unconstrain.judging import OF_WHAT_IS_SHOWN, Judge
 from unconstrain.policies.base import Policy
+from unconstrain.policies.inputs import as_demonstrations
 from unconstrain.selection import select_policy
 
 if TYPE_CHECKING:
@@ -212,7 +213,7 @@ def evaluate(
     if not isinstance(policy, Policy):
         raise PolicyError(f"evaluate is about a policy of unconstrain, got {type(policy).__name__}")
     check_is_fitted(policy)
-    demos = _as_demonstrations(X, U, groups)
+    demos = as_demonstrations(X, U, groups)
     if demos.states.shape[1] != policy.n_features_in_ or demos.actions.shape[1] != policy.n_actions_:
         raise DataError(
             f"the policy maps {policy.n_features_in_} states to {policy.n_actions_} actions, but the recordings have "
@@ -334,21 +335,6 @@ def _projections(policy: Policy, demos: Demonstrations) -> np.ndarray | None:
     if known is None or policy.risk == "direct":
         return None
     return known if scale is None else in_metric(known, scale)
-
-
-def _as_demonstrations(
-    X: Demonstrations | ArrayLike, U: ArrayLike | None, groups: ArrayLike | None
-) -> Demonstrations:
-    if isinstance(X, Demonstrations):
-        if U is not None:
-            raise DataError(
-                "demonstrations bring their own actions: give the demonstrations alone, or states and actions"
-            )
-        return X
-    if U is None:
-        raise DataError("give the actions beside the states: evaluate(policy, X, U)")
-    actions = np.asarray(U)
-    return Demonstrations(X, actions[:, None] if actions.ndim == 1 else actions, groups)
 
 
 def _cells(each: Score) -> tuple[str, ...]:

@@ -2,8 +2,9 @@
 An angle among the states
 =========================
 
-For people whose state has a heading, a yaw or a joint that turns round. Recorded angles jump from π to -π, and a policy
-that takes them for numbers differs on both sides of the jump. Say that it is an angle, and it does not.
+For people whose state has a heading, a yaw or a joint that turns round. Recorded angles jump from π to -π, and
+a policy that takes them for numbers differs on both sides of the jump. Say that it is an angle, and it does
+not.
 """
 
 import matplotlib.pyplot as plt
@@ -12,17 +13,18 @@ import numpy as np
 import unconstrain as uc
 
 # %%
-# A trolley is pushed to its dock, which it has to face backwards, at π: just where recorded headings jump. A wall or a jammed
-# castor bends most of the recordings. They ship with the package, and are simulated.
+# A trolley is pushed to its dock, which it has to face backwards, at π: just where recorded headings jump. A wall
+# or a jammed castor bends most of the recordings. They ship with the package, and are simulated.
 
-columns = dict(state=["x", "y", "yaw"], time="t", episode="run")
+columns = {"state": ["x", "y", "yaw"], "time": "t", "episode": "run"}
 demos = uc.load(uc.datasets.path("trolley.csv"), angle="yaw", **columns)
 print(demos.space, *demos.notes, sep="\n")
 training, others = demos.select(demos.episodes < 13), demos.select(demos.episodes >= 13)
 truth = uc.datasets.trolley_policy(others.states)
 
 # %%
-# One policy is learnt with the angle, another from the same motion with the heading between -π and π for a number.
+# One policy is learnt with the angle, another from the same motion with the heading between -π and π for a
+# number.
 
 
 def as_numbers(X):

@@ -2,9 +2,9 @@
 Wiping with a force sensor
 ==========================
 
-For people whose robot or tool has a force sensor, and who wonder whether it is worth using. Contact forces say along
-which direction a surface took motion away, and so the constraint of these samples is known. How much that is worth is
-measured here, over the number of recordings.
+For people whose robot or tool has a force sensor, and who wonder whether it is worth using. Contact forces say
+along which direction a surface took motion away, and so the constraint of these samples is known. How much that
+is worth is measured here, over the number of recordings.
 """
 
 import matplotlib.pyplot as plt
@@ -14,8 +14,8 @@ from sklearn.preprocessing import PolynomialFeatures
 import unconstrain as uc
 
 # %%
-# The same recordings twice: once without the sensor, once with it. A contact begins where the force exceeds 2 N, eight
-# times the sensor's noise.
+# The same recordings twice: once without the sensor, once with it. A contact begins where the force exceeds 2 N,
+# eight times the sensor's noise.
 
 blind = uc.datasets.load_wiping()
 sensed = uc.datasets.load_wiping(force_threshold=2.0)
@@ -49,8 +49,8 @@ for name, row in errors.items():
     print(f"{name:20}", *(f"{value:.4f}" for value in row))
 
 # %%
-# From two recordings alone no contact can be told, and what is learnt is ordinary regression: there the sensor is worth most.
-# From six on nothing is gained by it: that a board took motion away shows in the motion itself.
+# From two recordings alone no contact can be told, and what is learnt is ordinary regression: there the sensor is
+# worth most. From six on nothing is gained by it: that a board took motion away shows in the motion itself.
 
 figure, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 for (name, row), style in zip(errors.items(), ["s--", "o-", "^-"], strict=True):

@@ -2,8 +2,9 @@
 A goal that stands elsewhere each time
 ======================================
 
-For people who recorded reaching for something that is never at the same place twice. In the room such movements have no
-policy: the same place is passed in all directions. Relative to the goal they have one, and one option says so.
+For people who recorded reaching for something that is never at the same place twice. In the room such movements
+have no policy: the same place is passed in all directions. Relative to the goal they have one, and one option
+says so.
 """
 
 import matplotlib.pyplot as plt
@@ -13,8 +14,8 @@ import pandas as pd
 import unconstrain as uc
 
 # %%
-# Twenty simulated reaches on a table, in m. The person swings in from the side. In three of four reaches a ruler lies in
-# the way, along which the hand slides for the middle third.
+# Twenty simulated reaches on a table, in m. The person swings in from the side. In three of four reaches a ruler
+# lies in the way, along which the hand slides for the middle third.
 
 rng = np.random.default_rng(0)
 DT, SAMPLES = 0.02, 120
@@ -45,9 +46,10 @@ def reach(run):
 table = pd.concat([reach(run) for run in range(20)])
 
 # %%
-# ``relative_to`` takes the columns that say where the goal is. ``relative_to="goal"`` would take where each episode ends.
+# ``relative_to`` takes the columns that say where the goal is. ``relative_to="goal"`` would take where each
+# episode ends.
 
-options = dict(state=["x", "y"], time="t", episode="run")
+options = {"state": ["x", "y"], "time": "t", "episode": "run"}
 demos = uc.load(table, relative_to=["cup_x", "cup_y"], **options)
 room = uc.load(table, **options)
 candidates = {

@@ -2,9 +2,9 @@
 A pose: turning a cup into its saucer
 =====================================
 
-For people whose recordings hold orientations, as quaternions from a tracker or a robot, and movements that make sense
-relative to an object only. Quaternions change their sign in recordings, and the object stands and is turned elsewhere each
-time. Two options say so.
+For people whose recordings hold orientations, as quaternions from a tracker or a robot, and movements that make
+sense relative to an object only. Quaternions change their sign in recordings, and the object stands and is
+turned elsewhere each time. Two options say so.
 """
 
 import matplotlib.pyplot as plt
@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 import unconstrain as uc
 
 # %%
-# Twenty-four simulated movements of a cup to a saucer. Relative to the saucer the cup comes straight, and turns as it comes.
-# Each movement is cut in three; in most thirds something holds the cup along one direction of space, or about one axis,
-# another one each time.
+# Twenty-four simulated movements of a cup to a saucer. Relative to the saucer the cup comes straight, and turns
+# as it comes. Each movement is cut in three; in most thirds something holds the cup along one direction of space,
+# or about one axis, another one each time.
 
 rng = np.random.default_rng(0)
 PARTS, DT, SAMPLES = ("x", "y", "z", "qx", "qy", "qz", "qw"), 0.05, 60
@@ -57,7 +57,7 @@ table = pd.concat([move(run) for run in range(24)])
 # ``rotation`` says which columns are a quaternion, ``relative_to`` what the movement is relative to. Six
 # movements are held out.
 
-options = dict(state="cup", rotation=[f"cup.{part}" for part in PARTS[3:]], time="t", episode="run")
+options = {"state": "cup", "rotation": [f"cup.{part}" for part in PARTS[3:]], "time": "t", "episode": "run"}
 demos = uc.load(table, relative_to="saucer", **options)
 room = uc.load(table, **options)
 print(demos.space)

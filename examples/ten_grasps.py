@@ -2,8 +2,8 @@
 A policy from ten grasps
 ========================
 
-For people who have time for ten movements and not for a hundred, and need to know how far to trust what is learnt from
-them. A Gaussian process learns from few movements, and says how sure it is of each action.
+For people who have time for ten movements and not for a hundred, and need to know how far to trust what is
+learnt from them. A Gaussian process learns from few movements, and says how sure it is of each action.
 """
 
 import matplotlib.pyplot as plt
@@ -45,8 +45,8 @@ def record(n, seed, noise=0.03):
 ten, others = record(10, seed=0), record(40, seed=1)
 
 # %%
-# The kernel says that the policy is smooth, and about linear; its widths and the noise are those of largest marginal likelihood.
-# Local models, the default, and ordinary regression by the same process stand beside it.
+# The kernel says that the policy is smooth, and about linear; its widths and the noise are those of largest
+# marginal likelihood. Local models, the default, and ordinary regression by the same process stand beside it.
 
 
 def error(policy):
@@ -66,8 +66,8 @@ print(f"local models:                       nUPE {error(local):.4f}")
 print(f"ordinary regression by such models: nUPE {error(local.ordinary_regression()):.4f}")
 
 # %%
-# How sure it is: of forty other grasps, the true action lies within two standard deviations as often as printed. It should
-# be 95 %; from ten movements the process is a little too sure.
+# How sure it is: of forty other grasps, the true action lies within two standard deviations as often as printed.
+# It should be 95 %; from ten movements the process is a little too sure.
 
 predicted, deviation = process.predict(others.states, return_std=True)
 missed = np.abs(predicted - others.policy)

@@ -48,9 +48,11 @@ report = uc.identifiability(policy, demos)
 print(report)
 
 # %%
-# What it would record next: a place to start from, and a direction along which motion has to be possible.
+# What it would record next, if the policy matters all over the square: a place to start from, and a direction
+# along which motion has to be possible.
 
-advice = report.next_recordings(4)
+square = np.stack(np.meshgrid(*2 * [np.linspace(-0.9, 0.9, 13)]), axis=-1).reshape(-1, 2)
+advice = report.next_recordings(6, candidates=square)
 for number, one in enumerate(advice, start=1):
     print(
         f"{number}. from {one.state.round(2)}, free along {one.direction.round(2)}: "
@@ -58,44 +60,41 @@ for number, one in enumerate(advice, start=1):
     )
 
 # %%
-# Does it help? The four are recorded, and beside them, ten times over, four others that start anywhere and slide
+# Does it help? The six are recorded, and beside them, ten times over, six others that start anywhere and slide
 # along anything.
 
-others = uc.Demonstrations(grid := rng.uniform(-0.9, 0.9, (400, 2)), LimitCycle()(grid))
+truth = LimitCycle()(square)
 
 
 def error(policy):
     """Return the squared error all over the square, as a share of the true policy's variance."""
-    missed = uc.metrics.unconstrained_policy_error(others.actions, policy.predict(others.states))
-    return uc.metrics.normalized(missed, others.actions)
+    missed = uc.metrics.unconstrained_policy_error(truth, policy.predict(square))
+    return uc.metrics.normalized(missed, truth)
 
 
 advised = record(np.array([one.state for one in advice]), np.array([one.direction for one in advice]), seed=2)
 after = learn(uc.Demonstrations.concatenate([demos, advised]))
 by_chance = []
 for seed in range(10):
-    chance = record(rng.uniform(-1, 1, (4, 2)), along(rng.uniform(0, np.pi, 4)), seed=3 + seed)
+    chance = record(rng.uniform(-1, 1, (6, 2)), along(rng.uniform(0, np.pi, 6)), seed=3 + seed)
     by_chance.append(error(learn(uc.Demonstrations.concatenate([demos, chance]))))
 regression = learn(demos, "direct")
 print(f"nUPE of 28 movements {error(policy):.3f}; ordinary regression {error(regression):.3f}")
-print(f"with the four that were advised {error(after):.3f}")
-print(
-    f"with four by chance {np.median(by_chance):.3f} (median; {min(by_chance):.3f} to {max(by_chance):.3f})"
-)
+print(f"with the six that were advised {error(after):.3f}")
+print(f"with six by chance {np.median(by_chance):.3f} (median; {min(by_chance):.3f} to {max(by_chance):.3f})")
 
 # %%
 # How far the policy may be from what was learnt, before and after, on one scale.
 
 figure, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
-square, levels = [[-1, -1], [1, 1]], [0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6]
-uc.plot.identifiability(report, region=square, levels=levels, worst=0, ax=axes[0])
+corners, levels = [[-1, -1], [1, 1]], [0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6]
+uc.plot.identifiability(report, region=corners, levels=levels, worst=0, ax=axes[0])
 for one in advice:
-    axes[0].annotate(
-        "", one.state + 0.25 * one.direction, one.state, arrowprops={"color": "C3", "arrowstyle": "<|-|>"}
-    )
+    ends = one.state - 0.12 * one.direction, one.state + 0.12 * one.direction
+    axes[0].annotate("", *ends, arrowprops={"color": "red", "arrowstyle": "<|-|>", "linewidth": 2})
 known = uc.identifiability(after, uc.Demonstrations.concatenate([demos, advised]))
-uc.plot.identifiability(known, region=square, levels=levels, worst=0, ax=axes[1])
+uc.plot.identifiability(known, region=corners, levels=levels, worst=0, ax=axes[1])
 axes[0].set_title("28 movements; arrows: record these next")
-axes[1].set_title("with these four")
+axes[1].set_title("with these six")
 figure.savefig("record_next.png")
 plt.show()

@@ -7,6 +7,8 @@ thing, or where the state does not explain the motion, keep ordinary regression,
 `evaluate` ends with a verdict that says so.
 """
 
+import textwrap
+
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -62,7 +64,7 @@ for name, record in kinds.items():
         for made in (record(0), record(1))
     )
     policy = uc.ParametricPolicy(uc.NormalizedRBF(n_centers=25)).fit(demos)
-    print(f"{name}: {uc.evaluate(policy, others).verdict}\n")
+    print(textwrap.fill(f"{name}: {uc.evaluate(policy, others).verdict}", 100), end="\n\n")
     for row, learnt in zip(errors.values(), (policy, policy.ordinary_regression()), strict=True):
         missed = uc.metrics.unconstrained_policy_error(truth(grid), learnt.predict(grid))
         row.append(uc.metrics.normalized(missed, truth(grid)))

@@ -17,8 +17,7 @@ import unconstrain as uc
 
 # %%
 # The hand that wipes boards (it ships with the package, and is simulated) as a bad day would have logged it:
-# positions in cm, one in fifty missing, now and then another marker taken for the hand, each recording preceded
-# by a rest.
+# positions in cm, one row in fifty with a value missing, now and then another marker taken for the hand.
 
 rng = np.random.default_rng(0)
 clean = np.loadtxt(uc.datasets.path("wiping.csv"), delimiter=",", skiprows=1)

@@ -11,6 +11,7 @@ from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics.report import Identifiability
 from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
+from unconstrain.plot.columns import find_velocities
 from unconstrain.plot.constraints import constraint
 from unconstrain.plot.contacts import contact
 from unconstrain.plot.diagnostics import identifiability
@@ -43,7 +44,7 @@ def draw_policy(learnt: Policy, demos: Demonstrations) -> Figure:
         The policy's actions do not match those of the demonstrations.
     """
     n = demos.states.shape[1]
-    pairs = list(combinations(range(min(n, MOST_COORDINATES)), 2)) or [None]
+    pairs = _pair(n)
     infers = learnt.solution_.belief is not None
     several = learnt.risk != "direct" and learnt.ordinary_regression() is not None
     count = len(pairs) + infers
@@ -107,13 +108,12 @@ def draw_identifiability(report: Identifiability, state_names: Sequence[str]) ->
         There are not as many names as states, or the report is of moments alone.
     """
     n = len(state_names)
-    pairs = list(combinations(range(min(n, MOST_COORDINATES)), 2)) or [None]
+    pairs = _pair(n)
     shape = (2, 2) if len(pairs) > 1 else (1, 2)
     figure = Figure(figsize=(5.0 * shape[1], 4.4 * shape[0]), layout="constrained")
     *panels, last = figure.subplots(*shape).ravel()
     for ax, pair in zip(panels, pairs, strict=True):
         identifiability(report, coordinates=pair, state_names=state_names, ax=ax)
-    panels[0].legend(loc="best", fontsize=8)
     _draw_spectrum(last, report)
     if n > MOST_COORDINATES:
         figure.suptitle(f"The first {MOST_COORDINATES} of {n} states", fontsize=11)
@@ -137,9 +137,15 @@ def draw_constraint(learnt: LearntConstraint, demos: Demonstrations) -> Figure:
     """
     figure = Figure(figsize=(10.0, 4.4), layout="constrained")
     _draw_shares(figure.add_subplot(1, 2, 1), learnt)
-    space = demos.states.shape[1] == demos.actions.shape[1] == 3
-    constraint(learnt, demos, ax=figure.add_subplot(1, 2, 2, projection="3d" if space else None))
+    velocities = find_velocities(demos.space, demos.actions.shape[1])
+    in_space = len(velocities) == 3 and None not in velocities
+    constraint(learnt, demos, ax=figure.add_subplot(1, 2, 2, projection="3d" if in_space else None))
     return figure
+
+
+def _pair(n: int) -> list[tuple[int, int] | None]:
+    """Return the pairs of coordinates that are drawn, or None for the only one."""
+    return [*combinations(range(min(n, MOST_COORDINATES)), 2)] or [None]
 
 
 def _draw_spectrum(ax: Axes, report: Identifiability) -> None:
@@ -150,8 +156,8 @@ def _draw_spectrum(ax: Axes, report: Identifiability) -> None:
     ax.set(
         xlabel="share of a direction that was observed",
         ylabel="share of directions observed so much",
-        ylim=(0, 1.02),
     )
+    ax.set_ylim(0, 1.02)
     ax.legend(frameon=False, fontsize=8, loc="lower left")
     ax.set_title("Directions of the policy", fontsize=10.5)
     ax.grid(alpha=0.3)

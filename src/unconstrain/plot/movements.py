@@ -43,9 +43,9 @@ def demonstrations(
     groups : array_like of shape (N,), optional
         Episodes, beside states.
     coordinates : sequence of int, optional
-        Which two states are drawn over each other, or which three in space, counted from 0. By default the first two, of
-        three states too, as a plane is easier to read than a picture of space; or the first three if `ax` is in three
-        dimensions. A single state is drawn against time, or against the number of the sample.
+        Which two states are drawn over each other, or which three in space, counted from 0. By default the first two,
+        of three states too, as a plane is easier to read than a picture of space; or the first three if `ax` is in
+        three dimensions. A single state is drawn against time, or against the number of the sample.
     color, style : str
         Of the lines, as matplotlib names them.
     label : str, optional
@@ -93,7 +93,7 @@ def rollout(
     movement : Demonstrations, or array_like of shape (N, n)
         As `policy.rollout` returns it, or states.
     demos : Demonstrations, or array_like of shape (N, n), optional
-        Recordings to draw behind it.
+        Recordings to draw behind it; of a single state only those that have time.
     coordinates : sequence of int, optional
         Which states are drawn, as for `demonstrations`; against time any number of them, by default all.
     against_time : bool
@@ -121,18 +121,15 @@ def rollout(
         return _draw_all_over_time(movement, chosen, get_axes(ax))
     shown = check_coordinates(coordinates, n, ax)
     ax = get_axes(ax, len(shown))
-    if demos is not None:
-        demonstrations(demos, coordinates=coordinates, ax=ax)
+    recorded = None if demos is None else as_demonstrations(demos, None, None, actions_needed=False)
+    in_time = len(shown) == 1
+    if recorded is not None and not (in_time and recorded.time is None):
+        demonstrations(recorded, coordinates=coordinates, ax=ax)
     demonstrations(movement, coordinates=coordinates, color=LEARNT, style="-", label=label, ax=ax)
-    if isinstance(demos, Demonstrations):
+    if isinstance(demos, Demonstrations) and not in_time:
         label_axes(ax, demos, shown)  # whose names say more than x1, x2
-    if len(shown) > 1:
-        stopped = {stop.episode: stop for stop in getattr(movement, "stopped", ())}
-        for code in range(min(movement.n_episodes, MOST_EPISODES)):
-            end = movement.states[movement.episodes == code][-1, list(shown)]
-            mark = {"marker": "X", "color": DIRECT} if code in stopped else {"marker": "s", "color": LEARNT}
-            name = f"stopped after {stopped[code].time:.3g} s" if code in stopped else None
-            ax.plot(*end[:, None], ls="", ms=6, mec="white", label=name, zorder=4, **mark)
+    if not in_time:
+        _mark_ends(ax, movement, shown)
     add_title(ax, "Rollout of the policy")
     return ax
 
@@ -163,6 +160,15 @@ def draw_lines(
     ax.plot(*line.T, style, color=color, lw=1.1, label=label, zorder=1)
     starts = places[[rows[0] for rows in episodes]]
     ax.plot(*starts.T, "o", color=color, ms=2.6, zorder=1)
+
+
+def _mark_ends(ax: Any, movement: Demonstrations, shown: Sequence[int]) -> None:
+    stopped = {stop.episode: stop for stop in getattr(movement, "stopped", ())}
+    for code in range(min(movement.n_episodes, MOST_EPISODES)):
+        end = movement.states[movement.episodes == code][-1, list(shown)]
+        look = {"marker": "X", "color": DIRECT} if code in stopped else {"marker": "s", "color": LEARNT}
+        label = f"stopped after {stopped[code].time:.3g} s" if code in stopped else None
+        ax.plot(*end[:, None], ls="", ms=6, mec="white", label=label, zorder=4, **look)
 
 
 def _draw_all_over_time(movement: Demonstrations, coordinates: Sequence[int], ax: Axes) -> Axes:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_names, check_numbers, quote
+from unconstrain.arrays import check_names, check_numbers, check_whole, quote
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics.report import Identifiability
 from unconstrain.errors import DataError, PolicyError
@@ -80,7 +80,7 @@ def identifiability(
     codes = None if samples.groups is None else np.unique(samples.groups, return_inverse=True)[1]
     demos = Demonstrations(
         samples.states, samples.actions, codes, space=report.policy.space_,
-        state_names=None if names is None else check_names(list(names), "state_names", n),
+        state_names=None if names is None else check_names(names, "state_names", n),
     )  # fmt: skip
     shown = check_coordinates(coordinates, n, ax)
     is_field = n == d == 2
@@ -89,6 +89,7 @@ def identifiability(
             f"region= and levels= are of a field over two states of a policy with two actions, and this one has {n} "
             f"states and {d} actions"
         )
+    check_whole(worst, "worst", least=0)
     if levels is not None:
         levels = _check_levels(levels)
     corners = _find_corners(demos.states) if region is None else check_region(region)

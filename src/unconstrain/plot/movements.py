@@ -7,8 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_whole
+from unconstrain.arrays import check_whole, quote
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
 from unconstrain.plot.axes import add_title, check_coordinates, get_axes, label_axes
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 from unconstrain.plot.columns import name_columns
@@ -116,7 +117,9 @@ def rollout(
     movement = as_demonstrations(movement, None, None, actions_needed=False)
     n = movement.states.shape[1]
     if against_time:
-        chosen = range(n) if coordinates is None else coordinates
+        chosen = list(range(n)) if coordinates is None else coordinates
+        if not isinstance(chosen, tuple | list) or not chosen:
+            raise DataError(f"coordinates must be numbers counted from 0, got {quote(coordinates)}")
         chosen = [check_whole(i, "coordinates", least=0, most=n - 1) for i in chosen]
         return _draw_all_over_time(movement, chosen, get_axes(ax))
     shown = check_coordinates(coordinates, n, ax)

@@ -59,7 +59,7 @@ def evaluate(
         plot.save(figures.draw_policy(learnt, demos), figure)
     learnt_from = describe_inferred(learnt)
     if learnt_from:
-        reporting.say(f"of the recordings it was learnt from,\n{learnt_from}")
+        reporting.say(in_words_of_program(f"of the recordings it was learnt from,\n{learnt_from}"))
     reporting.say_table(("on these recordings", *COLUMNS[1:]), found.rows())
     for sentence in found.sentences():
         reporting.say(in_words_of_program(sentence))

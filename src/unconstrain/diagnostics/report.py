@@ -17,7 +17,7 @@ from unconstrain.diagnostics.foresight import Foresight
 from unconstrain.diagnostics.information import Information
 from unconstrain.diagnostics.regions import POOL, Region, find_worst_regions, orient
 from unconstrain.diagnostics.spectrum import compute_shares
-from unconstrain.diagnostics.words import describe
+from unconstrain.diagnostics.words import describe, format_report
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import farthest_first
 from unconstrain.features.scaling import Scaling
@@ -418,6 +418,9 @@ class Identifiability:
                 1, f"local models: {shares.min():.1%} to {shares.max():.1%} determined, {len(shares)} models"
             )
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return format_report(self)
 
     @property
     def _risks(self) -> np.ndarray:

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from unconstrain.notebook import format_sentences, format_table
+
 if TYPE_CHECKING:
     from unconstrain.diagnostics.report import Identifiability
 
@@ -55,6 +57,39 @@ def describe(
             f"±{one.deviation:.3g}, and {one.gain:.1%} of the expected squared error left by then would go."
         )
     return "\n".join(lines)
+
+
+def format_report(report: "Identifiability", k: int = 3) -> str:
+    """Write shares, bounds, and the worst regions in HTML, which notebooks show.
+
+    Parameters
+    ----------
+    report : Identifiability
+        Of recordings, or of moments alone, whose regions are not known.
+    k : int
+        How many regions to name.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    said = format_sentences(repr(report).splitlines())
+    if report.samples is None:
+        return said
+    policy = report.policy
+    states = getattr(policy, "state_names_", [f"x{i + 1}" for i in range(policy.n_features_in_)])
+    actions = [f"u{i + 1}" for i in range(policy.n_actions_)]
+    rows = [
+        (
+            format_state(region.state, states),
+            format_direction(region.direction, actions),
+            f"±{region.deviation:.3g}",
+            f"{region.speed:.3g}",
+        )
+        for region in report.worst_regions(k)
+    ]
+    return said + format_table(("known least at", "along", "to within", "policy's speed there"), rows)
 
 
 def describe_episodes(report: "Identifiability", k: int = 3) -> list[str]:

@@ -44,7 +44,6 @@ REPORT = uc.identifiability(DIRECT, X, U)
         (lambda: plot.contact(CYCLE, DEMOS), "contact is inferred by a policy of unconstrain"),
         (lambda: plot.contact(DIRECT, DEMOS), 'only after a fit with risk="adaptive"'),
         (lambda: plot.identifiability(REPORT, levels=[1.0]), "levels must be two or more"),
-        (lambda: plot.identifiability(REPORT, state_names=["x"]), "state_names must be 2 names"),
         (lambda: plot.identifiability(X), "a report is what uc.identifiability returns"),
         (lambda: plot.rollout(X, against_time=True, coordinates=[5]), "coordinates must be a whole number"),
         (lambda: plot.constraint(X, DEMOS), "a constraint is one that was learnt"),

@@ -32,7 +32,7 @@ def evaluate(
     otherwise; --state names all columns anew. Where something was in the way even the true policy differs from the
     recorded action: what is shown is the whole action of free samples, and the motion of others.
     """
-    read = [policy, *recorded.files, *([] if constraint is None else [constraint])]
+    read: list[str | Path] = [policy, *recorded.files, *([] if constraint is None else [constraint])]
     outputs.check_outputs(read, {"figure": figure}, overwrite=overwrite)
     from unconstrain.evaluation import evaluate as hold_against
     from unconstrain.evaluation.evaluation import COLUMNS

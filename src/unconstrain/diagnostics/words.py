@@ -77,13 +77,10 @@ def format_report(report: "Identifiability", k: int = 3) -> str:
     said = format_sentences(repr(report).splitlines())
     if report.samples is None:
         return said
-    policy = report.policy
-    states = getattr(policy, "state_names_", [f"x{i + 1}" for i in range(policy.n_features_in_)])
-    actions = [f"u{i + 1}" for i in range(policy.n_actions_)]
     rows = [
         (
-            format_state(region.state, states),
-            format_direction(region.direction, actions),
+            format_state(region.state, report.state_names),
+            format_direction(region.direction, report.action_names),
             f"±{region.deviation:.3g}",
             f"{region.speed:.3g}",
         )

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_names, check_numbers, check_whole, quote
+from unconstrain.arrays import check_numbers, check_whole, quote
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics.report import Identifiability
 from unconstrain.errors import DataError, PolicyError
@@ -34,7 +34,6 @@ def identifiability(
     region: ArrayLike | None = None,
     levels: ArrayLike | None = None,
     worst: int = 3,
-    state_names: Sequence[str] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw how far the policy may be from what was learnt, over the recorded states.
@@ -57,8 +56,6 @@ def identifiability(
         is.
     worst : int
         Mark as many of the recorded states where the policy is known least: where to record next.
-    state_names : sequence of str, optional
-        Names of the states; by default those that the policy has, or x1, x2, ...
     ax : Axes, optional
         Where to draw; new axes by default. A colour bar takes some of their room.
 
@@ -76,12 +73,10 @@ def identifiability(
         raise PolicyError(f"a report is what uc.identifiability returns, not {quote(report)}")
     samples = report.require_samples("where to draw")
     n, d = samples.states.shape[1], samples.actions.shape[1]
-    names = getattr(report.policy, "state_names_", None) if state_names is None else state_names
     codes = None if samples.groups is None else np.unique(samples.groups, return_inverse=True)[1]
     demos = Demonstrations(
-        samples.states, samples.actions, codes, space=report.policy.space_,
-        state_names=None if names is None else check_names(names, "state_names", n),
-    )  # fmt: skip
+        samples.states, samples.actions, codes, space=report.policy.space_, state_names=report.state_names
+    )
     shown = check_coordinates(coordinates, n, ax)
     is_field = n == d == 2
     if not is_field and not (region is None and levels is None):

@@ -193,6 +193,8 @@ def draw_arrows(
             *points.T, *arrows.T, color=color, label=label, arrow_length_ratio=0.3, lw=1.2 * width / WIDTH
         )
         return
+    ax.update_datalim(points + arrows)  # matplotlib looks at where arrows begin only
+    ax.autoscale_view()
     order = 2.0 if width == WIDTH else 1.9  # the broad ones below
     ax.quiver(
         *points.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, color=color, label=label,

@@ -1,6 +1,5 @@
 """The figures that the command line writes: pictures of `unconstrain.plot` side by side."""
 
-from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -87,15 +86,13 @@ def draw_rollout(movement: Demonstrations, demos: Demonstrations | None = None) 
     return figure
 
 
-def draw_identifiability(report: Identifiability, state_names: Sequence[str]) -> Figure:
+def draw_identifiability(report: Identifiability) -> Figure:
     """Draw how far a policy is determined over the states, and how much of each of its directions was observed.
 
     Parameters
     ----------
     report : Identifiability
         Of recordings.
-    state_names : sequence of str
-        Names of the n states.
 
     Returns
     -------
@@ -105,15 +102,15 @@ def draw_identifiability(report: Identifiability, state_names: Sequence[str]) ->
     Raises
     ------
     DataError
-        There are not as many names as states, or the report is of moments alone.
+        The report is of moments alone.
     """
-    n = len(state_names)
+    n = report.policy.n_features_in_
     pairs = _pair(n)
     shape = (2, 2) if len(pairs) > 1 else (1, 2)
     figure = Figure(figsize=(5.0 * shape[1], 4.4 * shape[0]), layout="constrained")
     *panels, last = figure.subplots(*shape).ravel()
     for ax, pair in zip(panels, pairs, strict=True):
-        identifiability(report, coordinates=pair, state_names=state_names, ax=ax)
+        identifiability(report, coordinates=pair, ax=ax)
     _draw_spectrum(last, report)
     if n > MOST_COORDINATES:
         figure.suptitle(f"The first {MOST_COORDINATES} of {n} states", fontsize=11)

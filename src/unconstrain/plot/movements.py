@@ -1,6 +1,7 @@
 """Movements as lines: recorded ones, and where a policy leads."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def rollout(
     movement : Demonstrations, or array_like of shape (N, n)
         As `policy.rollout` returns it, or states.
     demos : Demonstrations, or array_like of shape (N, n), optional
-        Recordings to draw behind it; of a single state only those that have time.
+        Recordings to draw behind it, whose names go on the axes; of a single state only those that have time.
     coordinates : sequence of int, optional
         Which states are drawn, as for `demonstrations`; against time any number of them, by default all.
     against_time : bool
@@ -116,6 +117,8 @@ def rollout(
     """
     movement = as_demonstrations(movement, None, None, actions_needed=False)
     n = movement.states.shape[1]
+    if isinstance(demos, Demonstrations) and demos.states.shape[1] == n:
+        movement = replace(movement, state_names=demos.state_names)  # which say more than x1, x2
     if against_time:
         chosen = list(range(n)) if coordinates is None else coordinates
         if not isinstance(chosen, tuple | list) or not chosen:
@@ -129,8 +132,6 @@ def rollout(
     if recorded is not None and not (in_time and recorded.time is None):
         demonstrations(recorded, coordinates=coordinates, ax=ax)
     demonstrations(movement, coordinates=coordinates, color=LEARNT, style="-", label=label, ax=ax)
-    if isinstance(demos, Demonstrations) and not in_time:
-        label_axes(ax, demos, shown)  # whose names say more than x1, x2
     if not in_time:
         _mark_ends(ax, movement, shown)
     add_title(ax, "Rollout of the policy")

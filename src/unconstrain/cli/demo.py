@@ -7,7 +7,7 @@ import click
 
 from unconstrain import atomic
 from unconstrain.cli import outputs, reporting
-from unconstrain.cli.command import command
+from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.errors import UnconstrainError
 from unconstrain.progress import working
 
@@ -60,7 +60,7 @@ def demo(out: Path, overwrite: bool) -> None:
     reporting.say(
         "nUPE, nCPE: squared error without and with constraints, as a share of the policy's variance"
     )
-    reporting.say(describe_inferred(policies["adaptive"]))
+    reporting.say(in_words_of_program(describe_inferred(policies["adaptive"])))
     reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}\nheld out: {others}")
     reporting.say("\nnext, the same from a file (put your own in its place):")
     reporting.say(

@@ -68,7 +68,7 @@ def diagnose(
         from unconstrain import plot
         from unconstrain.plot import figures
 
-        plot.save(figures.draw_identifiability(found, demos.state_names), figure)
+        plot.save(figures.draw_identifiability(found), figure)
     comparing.describe(comparison, evaluation)
     reporting.say()
     reporting.say(text)

@@ -1,8 +1,7 @@
 """A policy held against recordings that it has not seen, beside ordinary regression and standing still."""
 
-import html
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ from unconstrain.evaluation.findings import collect
 from unconstrain.evaluation.scores import Score, find_typical, gaussian_log_likelihood, score
 from unconstrain.evaluation.verdict import Verdict, conclude
 from unconstrain.judging import OF_WHAT_IS_SHOWN, Judge
+from unconstrain.notebook import format_sentences, format_table
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import as_demonstrations
 from unconstrain.selection import select_policy
@@ -145,12 +145,7 @@ class Evaluation:
         return "\n".join([*table, "", *self.sentences()])
 
     def _repr_html_(self) -> str:
-        def line(cells: Sequence[str], tag: str) -> str:
-            return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-        rows = "".join(line(row, "td") for row in self.rows())
-        said = "".join(f"<p>{html.escape(each)}</p>" for each in self.sentences())
-        return f"<table><thead>{line(COLUMNS, 'th')}</thead><tbody>{rows}</tbody></table>{said}"
+        return format_table(COLUMNS, self.rows()) + format_sentences(self.sentences())
 
 
 def evaluate(

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.motion import lengths
+
 Array = NDArray[np.float64]
 
 OF_SPEEDS, OF_MEDIAN = 0.9, 3.0
@@ -23,7 +25,7 @@ def find_full_speed(vectors: Array) -> float:
         The 0.9 quantile of the speeds, or three times their median where that is less: a tenth of the arrows, or a fast
         stretch of up to half of them, does not shorten the others to nothing. Above zero; 1 where nothing moves.
     """
-    speeds = np.linalg.norm(vectors, axis=1)
+    speeds = lengths(vectors)
     speeds = speeds[speeds > 0]
     if not len(speeds):
         return 1.0
@@ -48,5 +50,5 @@ def scale_arrows(vectors: Array, full_speed: float | None = None) -> Array:
     """
     vectors = np.where(np.isfinite(vectors).all(axis=1, keepdims=True), vectors, 0.0)
     full = find_full_speed(vectors) if full_speed is None else full_speed
-    speeds = np.linalg.norm(vectors, axis=1, keepdims=True)
+    speeds = lengths(vectors)[:, None]
     return vectors / np.maximum(speeds, full)

@@ -130,13 +130,14 @@ def add_title(ax: Any, title: str, note: str | None = None) -> None:
     )  # fmt: skip
 
 
-def _make_strip(ax: Axes, height: float) -> Axes:
-    """Make axes for a legend right above others, of so many points: matplotlib keeps titles above such axes, not legends."""
+def _make_strip(ax: Any, height: float) -> Axes:
+    """Make axes of so many points right above others, for a legend: titles move above axes, not above legends."""
     for earlier in ax.child_axes:
         if earlier.get_label() == STRIP:
             earlier.remove()
-    up = Affine2D().scale(height / 72) + ax.figure.dpi_scale_trans + ScaledTranslation(0, 1, ax.transAxes)
+    points: Any = Affine2D().scale(height / 72) + ax.figure.dpi_scale_trans
+    up = points + ScaledTranslation(0, 1, ax.transAxes)
     place = blended_transform_factory(ax.transAxes, up)
-    strip = ax.inset_axes((0.0, 0.0, 1.0, 1.0), transform=place, label=STRIP)
+    strip: Axes = ax.inset_axes((0.0, 0.0, 1.0, 1.0), transform=place, label=STRIP)
     strip.set_axis_off()
     return strip

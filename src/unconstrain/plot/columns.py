@@ -1,4 +1,4 @@
-"""What the numbers of a state are: their names with units, which action is the velocity of which, whether they share a scale."""
+"""What the numbers of a state are: names with units, which action is whose velocity, which of them share a scale."""
 
 from collections.abc import Sequence
 

@@ -92,13 +92,9 @@ def constraint(
     for rows in A.swapaxes(0, 1):
         arrows = pick_columns(align(rows)[picked], own)
         draw_arrows(ax, places[picked], arrows, spacing, DIRECT, None, 1.0)
-    ax.set_title(_title(A), fontsize=10.5)
+    k = A.shape[1]
+    ax.set_title(f"{k} of {d} directions constrained", fontsize=10.5)
     return ax
-
-
-def _title(A: Array) -> str:
-    k, d = A.shape[1:]
-    return f"{k} of {d} directions {'is' if k == 1 else 'are'} constrained: {'row' if k == 1 else 'rows'} of the constraint"
 
 
 def _draw_table(ax: Any, A: Array, action_names: Sequence[str]) -> None:

@@ -1,9 +1,11 @@
 """Where contact was: recorded movements, coloured by how surely nothing was in the way."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from numpy.typing import ArrayLike
 
 from unconstrain.arrays import quote
@@ -71,18 +73,11 @@ def contact(
     ax = get_axes(ax, len(shown))
     single = len(shown) == 1
     places = np.column_stack([demos.states, demos.actions[:, 0]]) if single else demos.states[:, list(shown)]
-    from matplotlib.colors import LinearSegmentedColormap
-
     episodes = split_episodes(demos.episodes)
     if not single:
         draw_lines(ax, places, episodes, BETWEEN, "-", None)
     rows = np.concatenate(episodes)
-    colors = LinearSegmentedColormap.from_list("contact", [DIRECT, BETWEEN, LEARNT])
-    # Matplotlib's axes in space take the third coordinate by position, and would shade dots by their depth.
-    space = {"depthshade": False} if is_in_space(ax) else {}
-    dots = ax.scatter(
-        *places[rows].T, c=free[rows], s=6, lw=0, cmap=colors, vmin=0, vmax=1, zorder=2, **space
-    )
+    dots = _draw_dots(ax, places[rows], free[rows])
     ax.figure.colorbar(dots, ax=ax, label="probability that nothing was in the way", shrink=0.8)
     if single:
         ax.set(xlabel=name_columns(demos)[0], ylabel=demos.action_names[0])
@@ -90,3 +85,11 @@ def contact(
         label_axes(ax, demos, shown)
     add_title(ax, f"Inferred contact: {np.mean(free):.0%} of the samples were free")
     return ax
+
+
+def _draw_dots(ax: Any, places: np.ndarray, free: np.ndarray) -> Any:
+    colors = LinearSegmentedColormap.from_list("contact", [DIRECT, BETWEEN, LEARNT])
+    look: dict[str, Any] = {"s": 6, "lw": 0, "cmap": colors, "vmin": 0, "vmax": 1, "zorder": 2}
+    if is_in_space(ax):
+        look["depthshade"] = False  # colours stand for contact
+    return ax.scatter(*places.T, c=free, **look)

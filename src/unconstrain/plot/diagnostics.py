@@ -8,12 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_names, check_numbers, quote
+from unconstrain.arrays import check_numbers, check_whole, quote
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics.report import Identifiability
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import farthest_first
-from unconstrain.plot.axes import check_coordinates, get_axes, label_axes
+from unconstrain.plot.axes import add_title, check_coordinates, get_axes, is_in_space, label_axes
 from unconstrain.plot.colors import DIRECT
 from unconstrain.plot.columns import name_columns
 from unconstrain.plot.fields import check_region
@@ -34,7 +34,6 @@ def identifiability(
     region: ArrayLike | None = None,
     levels: ArrayLike | None = None,
     worst: int = 3,
-    state_names: Sequence[str] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw how far the policy may be from what was learnt, over the recorded states.
@@ -57,8 +56,6 @@ def identifiability(
         is.
     worst : int
         Mark as many of the recorded states where the policy is known least: where to record next.
-    state_names : sequence of str, optional
-        Names of the states; by default those that the policy has, or x1, x2, ...
     ax : Axes, optional
         Where to draw; new axes by default. A colour bar takes some of their room.
 
@@ -76,12 +73,10 @@ def identifiability(
         raise PolicyError(f"a report is what uc.identifiability returns, not {quote(report)}")
     samples = report.require_samples("where to draw")
     n, d = samples.states.shape[1], samples.actions.shape[1]
-    names = getattr(report.policy, "state_names_", None) if state_names is None else state_names
     codes = None if samples.groups is None else np.unique(samples.groups, return_inverse=True)[1]
     demos = Demonstrations(
-        samples.states, samples.actions, codes, space=report.policy.space_,
-        state_names=None if names is None else check_names(list(names), "state_names", n),
-    )  # fmt: skip
+        samples.states, samples.actions, codes, space=report.policy.space_, state_names=report.state_names
+    )
     shown = check_coordinates(coordinates, n, ax)
     is_field = n == d == 2
     if not is_field and not (region is None and levels is None):
@@ -89,10 +84,10 @@ def identifiability(
             f"region= and levels= are of a field over two states of a policy with two actions, and this one has {n} "
             f"states and {d} actions"
         )
+    check_whole(worst, "worst", least=0)
     if levels is not None:
         levels = _check_levels(levels)
-    corners = np.stack([demos.states.min(axis=0), demos.states.max(axis=0)])
-    corners = corners if region is None else check_region(region)
+    corners = _find_corners(demos.states) if region is None else check_region(region)
     if is_field and corners.shape[1] != 2:
         raise DataError(f"region must have corners of two states, got {corners.shape[1]}")
     ax = get_axes(ax, len(shown))
@@ -107,18 +102,21 @@ def identifiability(
     if is_field:
         ax.set_aspect(ax.get_aspect(), adjustable="box")
         ax.set(xlim=corners[:, shown[0]], ylim=corners[:, shown[1]])
-    determined = f"{report.determined_share:.0%} of the policy's directions determined"
-    ax.set_title(determined, fontsize=10.5)
+    add_title(ax, f"{report.determined_share:.0%} of the policy's directions determined")
     return ax
+
+
+def _find_corners(X: Array) -> Array:
+    """Find the corners of what was recorded; a state that never changes gets an extent of one."""
+    low, high = X.min(axis=0), X.max(axis=0)
+    margin = np.where(high > low, 0.0, 0.5)
+    return np.stack([low - margin, high + margin])
 
 
 def _draw_field(
     ax: Any, report: Identifiability, corners: Array, levels: Array | None, shown: Sequence[int]
 ) -> None:
-    x, y = (
-        np.linspace(*side, CELLS) if side[0] < side[1] else side[0] + np.linspace(-0.5, 0.5, CELLS)
-        for side in corners.T
-    )
+    x, y = (np.linspace(a, b, CELLS) for a, b in corners.T)
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     deviation = np.sqrt(np.einsum("njj->n", report.covariance(grid))).reshape(CELLS, CELLS)
     if levels is None:
@@ -127,9 +125,7 @@ def _draw_field(
     values = np.clip(deviation, levels[0], levels[-1])
     a, b = (x, y) if tuple(shown) == (0, 1) else (y, x)
     image = ax.contourf(a, b, values if tuple(shown) == (0, 1) else values.T, levels, norm="log", cmap=COLORS)
-    decades = 10.0 ** np.arange(np.ceil(np.log10(levels[0])), np.floor(np.log10(levels[-1])) + 1)
-    ticks = decades if len(decades) > 1 else None
-    _add_bar(ax, image, "standard deviation, in units of the action", ticks)
+    _add_bar(ax, image, levels[0], levels[-1], "standard deviation, in units of the action")
 
 
 def _draw_states(ax: Any, report: Identifiability, demos: Demonstrations, shown: Sequence[int]) -> None:
@@ -145,11 +141,15 @@ def _draw_states(ax: Any, report: Identifiability, demos: Demonstrations, shown:
     if len(shown) == 1:
         ax.set_ylabel("standard deviation, in units of the action")
     else:
-        _add_bar(ax, dots, "largest standard deviation, in units of the action", None)
+        _add_bar(ax, dots, deviation[0], deviation[-1], "largest standard deviation, in units of the action")
 
 
-def _add_bar(ax: Any, shown: Any, label: str, ticks: Array | None) -> None:
-    ax.figure.colorbar(shown, ax=ax, label=label, format="%.2g", ticks=ticks, shrink=0.8)
+def _add_bar(ax: Any, shown: Any, low: float, high: float, label: str) -> None:
+    """Add a colour bar of a logarithmic scale with a few plain numbers."""
+    decades = 10.0 ** np.arange(np.ceil(np.log10(low)), np.floor(np.log10(high)) + 1)
+    ticks = decades if len(decades) > 2 else np.geomspace(low, high, 4)
+    bar = ax.figure.colorbar(shown, ax=ax, label=label, format="%.2g", ticks=ticks, shrink=0.8)
+    bar.minorticks_off()
 
 
 def _draw_ellipses(ax: Any, report: Identifiability, corners: Array, shown: Sequence[int]) -> None:
@@ -186,7 +186,7 @@ def _mark_worst(ax: Any, report: Identifiability, shown: Sequence[int], worst: i
         mew=2,
         label="known least: record here",
         zorder=4,
-        clip_on=False,
+        clip_on=is_in_space(ax),
     )
 
 

@@ -193,9 +193,12 @@ def draw_arrows(
             *points.T, *arrows.T, color=color, label=label, arrow_length_ratio=0.3, lw=1.2 * width / WIDTH
         )
         return
+    ax.update_datalim(points + arrows)  # matplotlib looks at where arrows begin only
+    ax.autoscale_view()
+    order = 2.0 if width == WIDTH else 1.9  # the broad ones below
     ax.quiver(
         *points.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, color=color, label=label,
-        width=width, headwidth=3.4, headlength=3.6, headaxislength=3.3, minlength=0.5, zorder=2 if width == WIDTH else 1.9,
+        width=width, headwidth=3.4, headlength=3.6, headaxislength=3.3, minlength=0.5, zorder=order,
     )  # fmt: skip
 
 

@@ -1,6 +1,5 @@
 """The figures that the command line writes: pictures of `unconstrain.plot` side by side."""
 
-from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -11,6 +10,7 @@ from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics.report import Identifiability
 from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
+from unconstrain.plot.columns import find_velocities
 from unconstrain.plot.constraints import constraint
 from unconstrain.plot.contacts import contact
 from unconstrain.plot.diagnostics import identifiability
@@ -43,7 +43,7 @@ def draw_policy(learnt: Policy, demos: Demonstrations) -> Figure:
         The policy's actions do not match those of the demonstrations.
     """
     n = demos.states.shape[1]
-    pairs = list(combinations(range(min(n, MOST_COORDINATES)), 2)) or [None]
+    pairs = _pair(n)
     infers = learnt.solution_.belief is not None
     several = learnt.risk != "direct" and learnt.ordinary_regression() is not None
     count = len(pairs) + infers
@@ -86,15 +86,13 @@ def draw_rollout(movement: Demonstrations, demos: Demonstrations | None = None) 
     return figure
 
 
-def draw_identifiability(report: Identifiability, state_names: Sequence[str]) -> Figure:
+def draw_identifiability(report: Identifiability) -> Figure:
     """Draw how far a policy is determined over the states, and how much of each of its directions was observed.
 
     Parameters
     ----------
     report : Identifiability
         Of recordings.
-    state_names : sequence of str
-        Names of the n states.
 
     Returns
     -------
@@ -104,16 +102,15 @@ def draw_identifiability(report: Identifiability, state_names: Sequence[str]) ->
     Raises
     ------
     DataError
-        There are not as many names as states, or the report is of moments alone.
+        The report is of moments alone.
     """
-    n = len(state_names)
-    pairs = list(combinations(range(min(n, MOST_COORDINATES)), 2)) or [None]
+    n = report.policy.n_features_in_
+    pairs = _pair(n)
     shape = (2, 2) if len(pairs) > 1 else (1, 2)
     figure = Figure(figsize=(5.0 * shape[1], 4.4 * shape[0]), layout="constrained")
     *panels, last = figure.subplots(*shape).ravel()
     for ax, pair in zip(panels, pairs, strict=True):
-        identifiability(report, coordinates=pair, state_names=state_names, ax=ax)
-    panels[0].legend(loc="best", fontsize=8)
+        identifiability(report, coordinates=pair, ax=ax)
     _draw_spectrum(last, report)
     if n > MOST_COORDINATES:
         figure.suptitle(f"The first {MOST_COORDINATES} of {n} states", fontsize=11)
@@ -137,9 +134,15 @@ def draw_constraint(learnt: LearntConstraint, demos: Demonstrations) -> Figure:
     """
     figure = Figure(figsize=(10.0, 4.4), layout="constrained")
     _draw_shares(figure.add_subplot(1, 2, 1), learnt)
-    space = demos.states.shape[1] == demos.actions.shape[1] == 3
-    constraint(learnt, demos, ax=figure.add_subplot(1, 2, 2, projection="3d" if space else None))
+    velocities = find_velocities(demos.space, demos.actions.shape[1])
+    in_space = len(velocities) == 3 and None not in velocities
+    constraint(learnt, demos, ax=figure.add_subplot(1, 2, 2, projection="3d" if in_space else None))
     return figure
+
+
+def _pair(n: int) -> list[tuple[int, int] | None]:
+    """Return the pairs of coordinates that are drawn, or None for the only one."""
+    return [*combinations(range(min(n, MOST_COORDINATES)), 2)] or [None]
 
 
 def _draw_spectrum(ax: Axes, report: Identifiability) -> None:
@@ -150,8 +153,8 @@ def _draw_spectrum(ax: Axes, report: Identifiability) -> None:
     ax.set(
         xlabel="share of a direction that was observed",
         ylabel="share of directions observed so much",
-        ylim=(0, 1.02),
     )
+    ax.set_ylim(0, 1.02)
     ax.legend(frameon=False, fontsize=8, loc="lower left")
     ax.set_title("Directions of the policy", fontsize=10.5)
     ax.grid(alpha=0.3)

@@ -1,14 +1,16 @@
 """Movements as lines: recorded ones, and where a policy leads."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain.arrays import check_whole
+from unconstrain.arrays import check_whole, quote
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
 from unconstrain.plot.axes import add_title, check_coordinates, get_axes, label_axes
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
 from unconstrain.plot.columns import name_columns
@@ -43,9 +45,9 @@ def demonstrations(
     groups : array_like of shape (N,), optional
         Episodes, beside states.
     coordinates : sequence of int, optional
-        Which two states are drawn over each other, or which three in space, counted from 0. By default the first two, of
-        three states too, as a plane is easier to read than a picture of space; or the first three if `ax` is in three
-        dimensions. A single state is drawn against time, or against the number of the sample.
+        Which two states are drawn over each other, or which three in space, counted from 0. By default the first two,
+        of three states too, as a plane is easier to read than a picture of space; or the first three if `ax` is in
+        three dimensions. A single state is drawn against time, or against the number of the sample.
     color, style : str
         Of the lines, as matplotlib names them.
     label : str, optional
@@ -93,7 +95,7 @@ def rollout(
     movement : Demonstrations, or array_like of shape (N, n)
         As `policy.rollout` returns it, or states.
     demos : Demonstrations, or array_like of shape (N, n), optional
-        Recordings to draw behind it.
+        Recordings to draw behind it, whose names go on the axes; of a single state only those that have time.
     coordinates : sequence of int, optional
         Which states are drawn, as for `demonstrations`; against time any number of them, by default all.
     against_time : bool
@@ -115,24 +117,23 @@ def rollout(
     """
     movement = as_demonstrations(movement, None, None, actions_needed=False)
     n = movement.states.shape[1]
+    if isinstance(demos, Demonstrations) and demos.states.shape[1] == n:
+        movement = replace(movement, state_names=demos.state_names)  # which say more than x1, x2
     if against_time:
-        chosen = range(n) if coordinates is None else coordinates
+        chosen = list(range(n)) if coordinates is None else coordinates
+        if not isinstance(chosen, tuple | list) or not chosen:
+            raise DataError(f"coordinates must be numbers counted from 0, got {quote(coordinates)}")
         chosen = [check_whole(i, "coordinates", least=0, most=n - 1) for i in chosen]
         return _draw_all_over_time(movement, chosen, get_axes(ax))
     shown = check_coordinates(coordinates, n, ax)
     ax = get_axes(ax, len(shown))
-    if demos is not None:
-        demonstrations(demos, coordinates=coordinates, ax=ax)
+    recorded = None if demos is None else as_demonstrations(demos, None, None, actions_needed=False)
+    in_time = len(shown) == 1
+    if recorded is not None and not (in_time and recorded.time is None):
+        demonstrations(recorded, coordinates=coordinates, ax=ax)
     demonstrations(movement, coordinates=coordinates, color=LEARNT, style="-", label=label, ax=ax)
-    if isinstance(demos, Demonstrations):
-        label_axes(ax, demos, shown)  # whose names say more than x1, x2
-    if len(shown) > 1:
-        stopped = {stop.episode: stop for stop in getattr(movement, "stopped", ())}
-        for code in range(min(movement.n_episodes, MOST_EPISODES)):
-            end = movement.states[movement.episodes == code][-1, list(shown)]
-            mark = {"marker": "X", "color": DIRECT} if code in stopped else {"marker": "s", "color": LEARNT}
-            name = f"stopped after {stopped[code].time:.3g} s" if code in stopped else None
-            ax.plot(*end[:, None], ls="", ms=6, mec="white", label=name, zorder=4, **mark)
+    if not in_time:
+        _mark_ends(ax, movement, shown)
     add_title(ax, "Rollout of the policy")
     return ax
 
@@ -163,6 +164,15 @@ def draw_lines(
     ax.plot(*line.T, style, color=color, lw=1.1, label=label, zorder=1)
     starts = places[[rows[0] for rows in episodes]]
     ax.plot(*starts.T, "o", color=color, ms=2.6, zorder=1)
+
+
+def _mark_ends(ax: Any, movement: Demonstrations, shown: Sequence[int]) -> None:
+    stopped = {stop.episode: stop for stop in getattr(movement, "stopped", ())}
+    for code in range(min(movement.n_episodes, MOST_EPISODES)):
+        end = movement.states[movement.episodes == code][-1, list(shown)]
+        look = {"marker": "X", "color": DIRECT} if code in stopped else {"marker": "s", "color": LEARNT}
+        label = f"stopped after {stopped[code].time:.3g} s" if code in stopped else None
+        ax.plot(*end[:, None], ls="", ms=6, mec="white", label=label, zorder=4, **look)
 
 
 def _draw_all_over_time(movement: Demonstrations, coordinates: Sequence[int], ax: Axes) -> Axes:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain.arrays import check_number
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
+from unconstrain.motion import root_mean_square
 from unconstrain.plot.arrows import find_full_speed
 from unconstrain.plot.axes import add_title, check_coordinates, get_axes, label_axes
 from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
@@ -61,18 +62,18 @@ def policy(
 ) -> Axes:
     """Draw a policy as arrows, over the movements that were recorded.
 
-    Of two states arrows stand on a grid, where there are recordings within about a spacing. Of more states they stand at
-    recorded ones, spread evenly over the coordinates that are drawn. Of a single state actions are drawn against it, as
-    a line. Arrows are as long as the action is fast, up to the 0.9 quantile of the speeds or three times their median,
-    whichever is less; faster ones are drawn at that length, which the legend says.
+    Of two states arrows stand on a grid, where there are recordings within about a spacing. Of more states they stand
+    at recorded ones, spread evenly over the coordinates that are drawn. Of a single state actions are drawn against it,
+    as a line. Arrows are as long as the action is fast, up to the 0.9 quantile of the speeds or three times their
+    median, whichever is less; faster ones are drawn at that length, which the legend says.
 
     Parameters
     ----------
     policy : object with ``predict(X)``, or callable ``X -> U``
         From states (N, n) to actions (N, d).
     demos : Demonstrations, or array_like of shape (N, n), optional
-        What it was learnt from, or other recordings; or their states. Without them, a fitted policy of one or two states
-        is drawn where it was learnt.
+        What it was learnt from, or other recordings; or their states. Without them, a fitted policy of one or two
+        states is drawn where it was learnt.
     U : array_like of shape (N, d), optional
         Actions, beside states.
     groups : array_like of shape (N,), optional
@@ -166,9 +167,9 @@ def comparison(
     ax = _draw(layers, recorded, policy, coordinates, None, None, ax)
     X = recorded.states[thin_evenly(len(recorded), MOST_POINTS)]
     P, Q = predict(policy, X), predict(rival, X)
-    size = np.sqrt(np.mean(np.sum(P**2, axis=1)))
-    apart = np.sqrt(np.mean(np.sum((P - Q) ** 2, axis=1)))
+    size = root_mean_square(P)
     if size > 0:
+        apart = root_mean_square(P - Q)
         ax.set_title(f"{ax.get_title()}: {apart / size:.0%} apart", fontsize=10.5)
     return ax
 
@@ -216,7 +217,7 @@ def _draw(
     n = demos.states.shape[1]
     if corners is not None and (n > 2 or corners.shape[1] != n):
         raise DataError(
-            f"region= is two corners over one or two states, and here they have {corners.shape[1]} of {n}"
+            f"region= is for one or two states, a number each in both corners, got {corners.shape[1]} for {n} states"
         )
     shown = check_coordinates(coordinates, n, ax)
     if is_recorded:

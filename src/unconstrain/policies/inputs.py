@@ -108,7 +108,7 @@ def as_demonstrations(
     states = check_numbers(demos, "states")
     if U is None:
         if actions_needed:
-            raise DataError("give the actions beside the states: X, U, or demonstrations in place of both")
+            raise DataError("give the actions beside the states, X and U, or demonstrations in place of both")
         U = np.zeros(states.shape)
     actions = check_numbers(U, "actions")
     return Demonstrations(states, actions[:, None] if actions.ndim == 1 else actions, groups)

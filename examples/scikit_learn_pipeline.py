@@ -18,10 +18,10 @@ import unconstrain as uc
 from unconstrain.limit_cycle import demonstrate
 
 # %%
-# Twenty noisy movements around a limit cycle, half of them free. The second state is in millimetres, the first in
+# Twenty-five noisy movements around a limit cycle, half of them free. The second state is in millimetres, the first in
 # metres: a kernel would see nothing but the second, so states are standardised first.
 
-demos = demonstrate(20, noise=0.03, free=0.5, random_state=0)
+demos = demonstrate(25, noise=0.03, free=0.5, random_state=0)
 others = demonstrate(20, random_state=1)
 units = [1.0, 1000.0]
 X, U, episodes = demos.states * units, demos.actions, demos.episodes
@@ -38,7 +38,7 @@ print(f"{policy.free_share_:.0%} of the samples were free; {policy.n_fits_} fits
 search = GridSearchCV(
     uc.RegressorPolicy(pipeline, max_fits=20),
     {"regressor__kernelridge__gamma": [0.01, 0.3, 10.0]},
-    cv=GroupKFold(2),
+    cv=GroupKFold(3),
 )
 search.fit(X, U, groups=episodes)
 gammas = search.cv_results_["param_regressor__kernelridge__gamma"].data.astype(float)

@@ -40,12 +40,14 @@ for name, order in {"place alone": 1, "place and velocity": 2}.items():
         print(f"{name}{kind}: {score:.1%} of what recordings held out show is explained")
 
 # %%
-# Both are followed from the start of a recording that was held out, for its 12 s.
+# Both are followed from the start of a recording that was held out, for its 12 s. An acceleration that is held
+# for a step leads outwards a little, so steps are short: 4 ms. With 20 ms the eight grows by a quarter in that
+# time.
 
 figure, axes = plt.subplots(1, 2, figsize=(9, 4.5), layout="constrained")
 for ax, (name, policy) in zip(axes, policies.items(), strict=True):
     recorded = recordings[name].episode(0)
-    movement = policy.rollout(recorded.states[0], steps=len(recorded) - 1, dt=0.02, beyond=np.inf)
+    movement = policy.rollout(recorded.states[0], steps=3000, dt=0.004, beyond=np.inf)
     uc.plot.rollout(movement.states[:, :2], recorded.states[:, :2], ax=ax)
     ax.set(title=name, xlabel="x, m", ylabel="y, m")
 figure.savefig("crossing.png")

@@ -38,7 +38,11 @@ def record(hinges, starts, seed):
     moved = simulate(wanted, starts, steps=99, dt=DT, project=project)
     noise = 0.01 * np.random.default_rng(seed).normal(size=moved.actions.shape)
     return uc.Demonstrations(
-        moved.states, moved.actions + noise, moved.episodes, time=moved.time, policy=moved.policy
+        moved.states,
+        moved.actions + noise,
+        moved.episodes,
+        policy=moved.policy,
+        state_names=("x [m]", "y [m]"),
     )
 
 

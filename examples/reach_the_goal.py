@@ -41,7 +41,12 @@ def record(starts, seed):
     )
     noise = 0.01 * rng.normal(size=moved.actions.shape)
     return uc.Demonstrations(
-        moved.states, moved.actions + noise, moved.episodes, time=moved.time, policy=moved.policy
+        moved.states,
+        moved.actions + noise,
+        moved.episodes,
+        moved.time,
+        moved.policy,
+        state_names=("x [m]", "y [m]"),
     )
 
 
@@ -74,10 +79,17 @@ for name, learnt in {"plain": policy, "stabilised": stable}.items():
     reached = np.linalg.norm(ends - GOAL, axis=1) < 0.01
     print(f"{name}: {np.mean(reached):.0%} of {len(grid)} movements end within 1 cm of the goal")
 
-figure, axes = plt.subplots(1, 2, figsize=(9, 4.6), layout="constrained")
-for ax, (name, movement) in zip(axes, movements.items(), strict=True):
-    uc.plot.rollout(movement, demos, ax=ax)
-    ax.plot(*GOAL, "kx", markersize=9)
-    ax.set_title(name)
+# %%
+# Left, where the stabilised policy leads. Right, how far from the goal either is: the plain policy comes to rest
+# 6 cm beside it.
+
+figure, axes = plt.subplots(1, 2, figsize=(10, 4.6), layout="constrained")
+uc.plot.rollout(movements["stabilised"], demos, ax=axes[0])
+for (name, movement), color in zip(movements.items(), ["C1", "C0"], strict=True):
+    far = np.linalg.norm(movement.states - GOAL, axis=1).reshape(len(grid), -1)
+    lines = axes[1].semilogy(movement.time[: far.shape[1]], far.T, color=color, linewidth=0.7)
+    lines[0].set_label(name)
+axes[1].set(xlabel="time, s", ylabel="distance from the goal, m", ylim=(1e-5, None))
+axes[1].legend()
 figure.savefig("reach_the_goal.png")
 plt.show()

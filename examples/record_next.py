@@ -94,6 +94,8 @@ for one in advice:
     axes[0].annotate("", *ends, arrowprops={"color": "red", "arrowstyle": "<|-|>", "linewidth": 2})
 known = uc.identifiability(after, uc.Demonstrations.concatenate([demos, advised]))
 uc.plot.identifiability(known, region=corners, levels=levels, worst=0, ax=axes[1])
+for ax in axes:
+    ax.set_xticks([-1, -0.5, 0, 0.5, 1])
 axes[0].set_title("28 movements; arrows: record these next")
 axes[1].set_title("with these six")
 figure.savefig("record_next.png")

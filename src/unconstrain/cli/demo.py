@@ -62,13 +62,13 @@ def demo(out: Path, overwrite: bool) -> None:
     )
     reporting.say(in_words_of_program(describe_inferred(policies["adaptive"])))
     reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}\nheld out: {others}")
+    wiping = reporting.shell_word(datasets.path("wiping.csv"))
+    reporting.say(f"another recording, a hand that wipes boards, with a force sensor: {wiping}")
     reporting.say("\nnext, the same from a file (put your own in its place):")
     reporting.say(
         f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --episode episode --model rbf "
         f"--width {experiment.WIDTH} --out {reporting.shell_word(out / 'policy.skops')} --overwrite"
     )
-    reporting.say("\nor from a hand that wipes boards, with a force sensor, which ships with the package:")
-    reporting.say(f"  unconstrain inspect {reporting.shell_word(datasets.path('wiping.csv'))}")
 
 
 def _write_markdown(columns: Sequence[str], rows: Sequence[Sequence[str]], path: Path) -> None:

@@ -45,8 +45,9 @@ for number in numbers:
     errors["ordinary regression"].append(error(inferred.ordinary_regression()))
     errors["contact inferred"].append(error(inferred))
     errors["contact measured"].append(error(measured))
+print(f"{'recordings learnt from':22}", *(f"{number:6}" for number in numbers))
 for name, row in errors.items():
-    print(f"{name:20}", *(f"{value:.4f}" for value in row))
+    print(f"{name:22}", *(f"{value:.4f}" for value in row))
 
 # %%
 # From two recordings alone no contact can be told, and what is learnt is ordinary regression: there the sensor is

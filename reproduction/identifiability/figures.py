@@ -43,7 +43,7 @@ def plot_toy(seed: int = 0, movements: int = 4) -> Figure:
     right.set(xlabel="x1", ylabel="x2", aspect="equal", xlim=(-1, 1), ylim=(-1, 1))
     right.set_title("actual: error of the policy", fontsize=10.5)
     figure.colorbar(
-        shown, ax=right, ticks=[1e-3, 1e-2, 1e-1, 1, 10], format="%g", label="units of the action"
+        shown, ax=right, ticks=[1e-3, 1e-2, 1e-1, 1, 10], format="%g", label="units of the action", shrink=0.8
     )
     return figure
 

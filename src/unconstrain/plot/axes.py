@@ -15,6 +15,8 @@ from unconstrain.plot.columns import name_columns, share_scale
 
 Array = NDArray[np.float64]
 
+NARROWEST = 0.5
+"""Shorter side of a picture to one scale, in longer ones."""
 STRIP, LINE = "legend above", 14.0
 """Label of the axes that hold the legend of others, and height of one of its lines, in points."""
 
@@ -100,8 +102,18 @@ def label_axes(ax: Any, demos: Demonstrations, coordinates: Sequence[int]) -> No
     if is_in_space(ax):
         ax.locator_params(nbins=5)
     if share_scale(demos, coordinates):
-        # In space only the box can give way.
-        ax.set_aspect("equal", adjustable="box" if is_in_space(ax) else "datalim")
+        # The box gives way and not the limits, which are the user's to set.
+        ax.set_aspect("equal", adjustable="box")
+        if not is_in_space(ax):
+            _widen(ax, demos.states[:, list(coordinates)])
+
+
+def _widen(ax: Axes, places: Array) -> None:
+    """Leave room for the shorter side of some places: a straight line in one scale would make a slit of the axes."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    half = np.maximum(high - low, NARROWEST * np.max(high - low)) / 2
+    ax.update_datalim([(low + high) / 2 - half, (low + high) / 2 + half])
+    ax.autoscale_view()
 
 
 def add_title(ax: Any, title: str, note: str | None = None) -> None:

@@ -100,7 +100,6 @@ def identifiability(
     _mark_worst(ax, report, shown, worst)
     _label(ax, demos, shown)
     if is_field:
-        ax.set_aspect(ax.get_aspect(), adjustable="box")
         ax.set(xlim=corners[:, shown[0]], ylim=corners[:, shown[1]])
     add_title(ax, f"{report.determined_share:.0%} of the policy's directions determined")
     return ax

@@ -253,7 +253,9 @@ def _draw(
     for layer, each in zip(layers, vectors, strict=True):
         draw_arrows(ax, places, each, spacing, layer.color, layer.label, full, layer.width)
     if not quiet:
-        add_title(ax, _title(layers), _note(full, demos, shown, spacing))
+        moves = any(each.any() for each in vectors)
+        note = _note(full, demos, shown, spacing) if moves else "at rest everywhere"
+        add_title(ax, _title(layers), note)
     return ax
 
 

@@ -99,8 +99,7 @@ def label_axes(ax: Any, demos: Demonstrations, coordinates: Sequence[int]) -> No
     names = name_columns(demos)
     for axis, i in zip("xyz", coordinates, strict=False):
         ax.set(**{f"{axis}label": names[i]})
-    if is_in_space(ax):
-        ax.locator_params(nbins=5)
+    ax.locator_params(nbins=5 if is_in_space(ax) else 6)  # more of them overlap
     if share_scale(demos, coordinates):
         # The box gives way and not the limits, which are the user's to set.
         ax.set_aspect("equal", adjustable="box")

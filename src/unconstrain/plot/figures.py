@@ -17,13 +17,14 @@ from unconstrain.plot.diagnostics import identifiability
 from unconstrain.plot.movements import rollout
 from unconstrain.plot.policies import comparison, policy
 from unconstrain.policies.base import Policy
+from unconstrain.policies.inferred import finds_no_contact
 
 MOST_COORDINATES = 3
 """Pairs of so many states are drawn, where there are more."""
 
 
 def draw_policy(learnt: Policy, demos: Demonstrations) -> Figure:
-    """Draw a policy over recordings, beside ordinary regression where that is known, and the contact it infers.
+    """Draw a policy over recordings, beside ordinary regression where that differs, and the contact it infers.
 
     Parameters
     ----------
@@ -45,7 +46,9 @@ def draw_policy(learnt: Policy, demos: Demonstrations) -> Figure:
     n = demos.states.shape[1]
     pairs = _pair(n)
     infers = learnt.solution_.belief is not None
-    several = learnt.risk != "direct" and learnt.ordinary_regression() is not None
+    # Without contact both are the same.
+    same = learnt.risk == "direct" or finds_no_contact(learnt)
+    several = not same and learnt.ordinary_regression() is not None
     count = len(pairs) + infers
     shape = (2, 2) if count > 2 else (1, count)
     figure = Figure(figsize=(5.0 * shape[1], 4.6 * shape[0]), layout="constrained")

@@ -55,7 +55,8 @@ def identifiability(
         Standard deviations between which the field's colour changes, in units of the action; by default the range there
         is.
     worst : int
-        Mark so many of the recorded states where the policy is known least; `report.next_recordings` says what to record.
+        Mark so many of the recorded states where the policy is known least. What to record next is said by
+        `report.next_recordings`.
     ax : Axes, optional
         Where to draw; new axes by default. A colour bar takes some of their room.
 

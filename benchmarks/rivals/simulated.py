@@ -86,7 +86,11 @@ def tabulate(results: Mapping[str, Row]) -> str:
         parts.append(f"{title}:\n\n{markdown.table(['', *results], shown)}")
     lines = []
     for row, found in results.items():
-        chosen = [f"{name} {option}" for name, (option, _) in found.items() if option is not None]
+        chosen = [
+            f"{name} {option}"
+            for name, (option, errors) in found.items()
+            if option is not None and not np.isnan(errors.path)
+        ]
         lines.append(f"- {row}: {'; '.join(chosen)}")
     return "\n\n".join([*parts, "Options:", "\n".join(lines)])
 

@@ -66,6 +66,10 @@ METHODS: Mapping[str, Method] = {
 }
 
 
+Results = dict[str, tuple[Option, dict[str, Errors]]]
+"""By method the option that was chosen, and errors by shape."""
+
+
 def draw(folder: Path, name: str, repetition: int) -> Drawing:
     """Load a shape; all of them end at the origin."""
     shape = Shape.load(folder, name, repetition)
@@ -75,40 +79,48 @@ def draw(folder: Path, name: str, repetition: int) -> Drawing:
 def measure(learnt: Learnt, drawing: Drawing) -> Errors:
     """Measure on the three demonstrations that were held out."""
     held_out, velocity = drawing.shape.held_out, learnt.velocity
-    duration = float(np.mean([t[-1] - t[START] for _, _, t in drawing.shape.shown]))
-    starts = [X[START] for X, _, _ in held_out]
+    stopped = measure_stopped(learnt, drawing)
+    extent = float(np.max(np.ptp(drawing.recorded.demos.states, axis=0)))
     rmse = direction = np.nan
     if velocity is None:
-        paths: list[Array] = list(learnt.follow(np.array(starts), duration, DT))
+        paths = follow(learnt, drawing)
     else:
         X, U = (np.vstack([each[i] for each in held_out]) for i in (0, 1))
         P = velocity(X)
         rmse, direction = velocity_error(U, P), direction_error(U, P)
-        paths = simulate(velocity, starts)
-    stop = round(duration / DT) + 1
-    extent = float(np.max(np.ptp(drawing.recorded.demos.states, axis=0)))
-    ends = np.array([path[-1] for path in paths])
-    return Errors(
-        rmse,
-        direction,
-        float(np.mean([warping_distance(a, X) for a, (X, _, _) in zip(paths, held_out, strict=True)])),
-        float(np.mean([warping_distance(a[:stop], X) for a, (X, _, _) in zip(paths, held_out, strict=True)])),
-        float(np.mean(np.linalg.norm(ends, axis=1) <= NEAR * extent)),
-    )
+        paths = simulate(velocity, [X[START] for X, _, _ in held_out])
+    arrives = [np.linalg.norm(path[-1]) <= NEAR * extent for path in paths]
+    return Errors(rmse, direction, _compare(paths, drawing), stopped, float(np.mean(arrives)))
 
 
-def measure_all(folder: Path) -> dict[str, tuple[Option, dict[str, Errors]]]:
-    """Measure all methods on all shapes: by method the option that was chosen, and errors by shape."""
+def measure_stopped(learnt: Learnt, drawing: Drawing) -> float:
+    """Measure the DTW distance of movements that last as long as those learnt from do, on average."""
+    return _compare(follow(learnt, drawing), drawing)
+
+
+def follow(learnt: Learnt, drawing: Drawing) -> list[Array]:
+    """Move from where movements that were held out begin, as long as those learnt from last on average."""
+    duration = float(np.mean([t[-1] - t[START] for _, _, t in drawing.shape.shown]))
+    return list(learnt.follow(np.array([X[START] for X, _, _ in drawing.shape.held_out]), duration, DT))
+
+
+def _compare(paths: list[Array], drawing: Drawing) -> float:
+    pairs = zip(paths, drawing.shape.held_out, strict=True)
+    return float(np.mean([warping_distance(path, X) for path, (X, _, _) in pairs]))
+
+
+def measure_all(folder: Path) -> Results:
+    """Measure all methods on all shapes."""
     shapes = list_shapes(folder)
     tried = [draw(folder, name, CHOSEN_IN) for name in TUNED_ON if name in shapes]
     drawings = {name: draw(folder, name, 0) for name in shapes}
-    found = {}
+    found: Results = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # iterations of networks and mixtures end before they converge
         for name, method in track(
             METHODS.items(), "handwriting", transient=True, console=Console(stderr=True)
         ):
-            option = choose(method, lambda learnt, drawing: measure(learnt, drawing).dtw_stopped, tried)
+            option = choose(method, measure_stopped, tried)
             errors = {}
             for shape, drawing in drawings.items():
                 learnt = method.learn(drawing.recorded, option)
@@ -125,7 +137,11 @@ def print_table(folder: Path | None) -> None:
             "handwriting needs recordings: give --data=FOLDER, which holds handwriting/*.mat"
         )
     check_installed()
-    found = measure_all(folder)
+    print(tabulate(measure_all(folder)))
+
+
+def tabulate(found: Results) -> str:
+    """Write means over all shapes, and over those without a star, and the options, as Markdown."""
     rows = [
         [f"{name}, published", "26", f"{rmse:.2f}", f"{direction:.3f}", f"{dtw:.0f}", "", ""]
         for name, (rmse, direction, dtw) in PUBLISHED.items()
@@ -133,13 +149,10 @@ def print_table(folder: Path | None) -> None:
     for name, (_, errors) in found.items():
         for names in (list(errors), [shape for shape in errors if shape not in TUNED_ON]):
             if names:
-                rows.append(
-                    _row(name, len(names), Errors(*np.mean([errors[each] for each in names], axis=0)))
-                )
+                rows.append(_row(name, [errors[each] for each in names]))
     heads = ["", "shapes", "RMSE", "1 - cos", "DTW", "DTW, stopped in time, median", "arrives"]
-    print(markdown.table(heads, rows))
     chosen = [f"{name} {option}" for name, (option, _) in found.items() if option is not None]
-    print(f"\nOptions: {'; '.join(chosen)}")
+    return f"{markdown.table(heads, rows)}\n\nOptions: {'; '.join(chosen)}"
 
 
 def _row(name: str, errors: list[Errors]) -> list[str]:

@@ -73,6 +73,7 @@ def learn(recorded: Recorded, option: tuple[int, bool]) -> Primitive | None:
         return None
     check_installed()
     demos, (weights, smooth) = recorded.demos, option
+    assert demos.time is not None
     found = []
     for episode in np.unique(demos.episodes):
         own = demos.episodes == episode

@@ -8,10 +8,9 @@ from scipy.linalg import solve_continuous_lyapunov
 from sklearn.mixture import GaussianMixture
 
 from benchmarks import __main__ as program
-from benchmarks.rivals import lpv_ds, mixture, primitives
+from benchmarks.rivals import handwriting, lpv_ds, mixture, plants, primitives, simulated
 from benchmarks.rivals.learnt import Field, Recorded
-from benchmarks.rivals.methods import Method, choose
-from benchmarks.rivals.plants import compare_paths
+from benchmarks.rivals.methods import METHODS, Method, choose
 from unconstrain.demonstrations import Demonstrations
 
 
@@ -46,7 +45,7 @@ def test_a_primitive_repeats_the_movement_it_imitates():
     demos = Demonstrations(X, np.gradient(X, t, axis=0), time=t)
     learnt = primitives.learn(Recorded(demos, X[-1]), (25, False))
     paths = learnt.follow(X[:1], 1.0, 0.01)
-    assert compare_paths(paths, X[None]) < 0.02
+    assert plants.compare_paths(paths, X[None]) < 0.02
 
 
 def test_the_option_of_least_error_is_chosen_and_an_error_in_time_does_not_count():
@@ -56,7 +55,7 @@ def test_the_option_of_least_error_is_chosen_and_an_error_in_time_does_not_count
         == -1
     )
     line = np.linspace(0, 1, 101)[None, :, None] * np.ones((1, 1, 2))
-    assert compare_paths(line[:, ::2], line) < 0.01
+    assert plants.compare_paths(line[:, ::2], line) < 0.01
 
 
 def test_handwriting_says_what_it_needs(monkeypatch, capsys):
@@ -65,3 +64,17 @@ def test_handwriting_says_what_it_needs(monkeypatch, capsys):
         program.main()
     assert stopped.value.code == 2
     assert "give --data=FOLDER" in capsys.readouterr().err
+
+
+def test_tables_say_what_does_not_apply_and_what_diverges():
+    errors = {name: (None, plants.Errors(0.5, np.nan, 0.1)) for name in METHODS}
+    written = simulated.tabulate({"cycle": errors | {"GMR": (7, plants.Errors(0.25, 0.125, np.nan))}})
+    assert "| GMR | 0.25 |" in written
+    assert written.count("| GMR |") == 2, "a method that has no path is left out of that table"
+    drawn = {
+        "Angle": handwriting.Errors(1.0, 0.1, np.inf, 900.0, 0.0),
+        "GShape": handwriting.Errors(3.0, 0.3, 1.0, 700.0, 1.0),
+    }
+    written = handwriting.tabulate({"GMR": (7, drawn)})
+    assert "| GMR | 2 | 2.00 | 0.200 | some diverge | 800 | 50% |" in written
+    assert "| GMR | 1 | 3.00 | 0.300 | 1 | 700 | 100% |" in written

@@ -19,7 +19,14 @@ SHOWN = ("position", "position and velocity (`--order 2`)")
 
 COMPARED: Mapping[str, Method] = {
     name: METHODS[name]
-    for name in ("ours: direct", "ours: adaptive", "GMR", "cloning: network", "cloning: trees")
+    for name in (
+        "ours: direct",
+        "ours: adaptive",
+        "ours: trees, adaptive",
+        "GMR",
+        "cloning: network",
+        "cloning: trees",
+    )
 }
 """Those that have an action for a state, and need no goal and no labels."""
 

@@ -156,10 +156,10 @@ np.savetxt("panda.csv", np.concatenate(movements), delimiter=",", header=",".joi
 
 # %%
 # From here on it is your file. Joint velocities come from the joint angles. What is learnt is a policy over the joints:
-# there a contact takes away the part of the motion along one direction, the row ``nᵀJ`` of the Jacobian, since all servos
-# are alike. Of the hand's own velocity it would take away a slanted part. But not any policy of seven numbers will do: it
-# is a hand's velocity, which depends on where the hand is, brought to the joints by ``J⁺``, and a pull on the posture
-# that leaves the hand alone. Three methods make that a feature map.
+# there a contact takes away the part of the motion along one direction, the row ``nᵀJ`` of the Jacobian, since all
+# servos are alike. Of the hand's own velocity it would take away a slanted part. But not any policy of seven joints will
+# do: it is the velocity of a hand, which depends on where the hand is, brought to the joints by ``J⁺``, and a pull on the
+# posture that leaves the hand alone. Three methods make that a feature map.
 
 demos = uc.load("panda.csv", state=list(panda.joints), time="t", episode="run")
 print(*demos.notes, sep="\n")
@@ -227,8 +227,8 @@ print(f"free: {1 - touched.mean():.0%} by the sensor, {learnt.free_share_:.0%} i
 # %%
 # On the robot. The hand's part of what was learnt is compiled for the control loop. Every 2 ms mink turns its velocity
 # into joint velocities: those that move the hand so and, as far as that leaves it open, pull on the posture as the
-# person did. They keep to the joints' limits and to 80 % of the maker's velocities, and no link comes nearer to the wall
-# than 2 cm. That is written as Pink writes barriers: a link at a distance ``h`` approaches at ``BRAKING (h - 2 cm)`` at most.
+# person did. They keep to the joints' limits and to 80 % of the maker's velocities, and no link comes nearer to the
+# wall than 2 cm, written as Pink writes barriers: at a distance ``h`` it approaches at ``BRAKING (h - 2 cm)`` at most.
 
 VELOCITIES = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
 CLEARANCE, BRAKING = 0.02, 4.0

@@ -8,9 +8,10 @@ and past a wall that was in no recording. It needs the extra `sim` and the robot
 """
 
 # %%
-# The arm as its maker describes it. Every frame of it can be asked for positions and Jacobians; the fingers stay shut.
-# MuJoCo moves it: seven velocity servos of one gain with the maker's limits of torque, motors whose inertia is felt as
-# 0.1 kg m², and gravity compensated, as the real arm does by itself. Only a ball at the hand's tip can touch something.
+# The arm as its maker describes it. Every frame of it can be asked for positions and Jacobians; the fingers stay
+# shut. MuJoCo moves it: seven velocity servos of one gain with the maker's limits of torque, motors whose inertia is
+# felt as 0.1 kg m², and gravity compensated, as the real arm does by itself. Only a ball at the hand's tip can touch
+# something.
 
 import base64
 import os
@@ -155,11 +156,11 @@ columns = ["run", "t", *panda.joints, "fx", "fy", "fz"]
 np.savetxt("panda.csv", np.concatenate(movements), delimiter=",", header=",".join(columns), comments="")
 
 # %%
-# From here on it is your file. Joint velocities come from the joint angles. What is learnt is a policy over the joints:
-# there a contact takes away the part of the motion along one direction, the row ``nᵀJ`` of the Jacobian, since all
-# servos are alike. Of the hand's own velocity it would take away a slanted part. But not any policy of seven joints will
-# do: it is the velocity of a hand, which depends on where the hand is, brought to the joints by ``J⁺``, and a pull on the
-# posture that leaves the hand alone. Three methods make that a feature map.
+# From here on it is your file. Joint velocities come from the joint angles. What is learnt is a policy over the
+# joints: there a contact takes away the part of the motion along one direction, the row ``nᵀJ`` of the Jacobian,
+# since all servos are alike. Of the hand's own velocity it would take away a slanted part. But not any policy of
+# seven joints will do: it is the velocity of a hand, which depends on where the hand is, brought to the joints by
+# ``J⁺``, and a pull on the posture that leaves the hand alone. Three methods make that a feature map.
 
 demos = uc.load("panda.csv", state=list(panda.joints), time="t", episode="run")
 print(*demos.notes, sep="\n")
@@ -333,8 +334,8 @@ print(
 )
 
 # %%
-# The picture: the hand's paths from above and from the side, those that were recorded in grey, and the arm as it slides
-# along the wall.
+# The picture: the hand's paths from above and from the side, those that were recorded in grey, and the arm as it
+# slides along the wall.
 
 
 def film(name, model, every=25):

@@ -3,8 +3,8 @@ A ROS 2 node
 ============
 
 For people whose robot speaks ROS 2: each message of joint states becomes an action of a compiled policy, and that a
-trajectory of one point, a tenth of a second ahead. Run ``python ros2_node.py step.npz shoulder,elbow,wrist`` where ROS 2
-is sourced; the joints are named in the order of the policy's states. Nothing above `main` needs ROS.
+trajectory of one point, a tenth of a second ahead. Run ``python ros2_node.py step.npz shoulder,elbow,wrist`` where
+ROS 2 is sourced; the joints are named in the order of the policy's states. Nothing above `main` needs ROS.
 """
 
 # %%
@@ -42,7 +42,8 @@ def write_command(trajectory, point, joints, state, action, dt):
 
 # %%
 # The node. Where a message lacks a joint it says so and sends nothing: the controller then holds the arm at the last
-# point. A compiled policy acts anywhere: mind where the arm is when you start it, and let the controller keep its limits.
+# point. A compiled policy acts anywhere: mind where the arm is when you start it, and let the controller keep its
+# limits.
 
 
 def main(path, joints, dt=0.1):

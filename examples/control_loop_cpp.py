@@ -13,6 +13,7 @@ brings the library.
 
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -48,7 +49,7 @@ states.tofile(folder / "states.f64")
 compiler = shutil.which("g++") or shutil.which("clang++")
 if compiler is None:
     raise SystemExit("there is no C++ compiler here: install g++ or clang++")
-sources = Path(__file__).parent / "cpp"
+sources = Path(sys.argv[0]).parent / "cpp"
 (library,) = Path(onnxruntime.__file__).parent.glob("capi/libonnxruntime.so.*")
 (folder / "libonnxruntime.so.1").symlink_to(library)  # the name that programs look for
 command = [compiler, "-O3", "-std=c++17", "-Wall", "-Wextra", "-idirafter", sources / "subset"]

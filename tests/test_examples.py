@@ -9,8 +9,8 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
-ELSEWHERE = {"lerobot_loss", "robot_panda", "control_loop_cpp", "ros2_node"}
-"""In tests/torch; twice where the gallery is built, since they render or compile; where there is ROS 2."""
+ELSEWHERE = {"lerobot_loss", "robot_panda", "robot_wall", "control_loop_cpp", "ros2_node"}
+"""In tests/torch; where the gallery is built, since they simulate, render or compile; where there is ROS 2."""
 QUICK = [path for path in EXAMPLES if path.stem not in ELSEWHERE]
 
 

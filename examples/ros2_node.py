@@ -32,9 +32,8 @@ def read_state(message, joints):
 
 def write_command(trajectory, point, joints, state, action, dt):
     """Fill a trajectory_msgs/JointTrajectory with the one point where the action leads in `dt` seconds."""
-    point.positions = (
-        state + dt * action
-    ).tolist()  # controllers refuse a trajectory that ends with a velocity
+    # Without a velocity: controllers refuse a trajectory that ends with one.
+    point.positions = (state + dt * action).tolist()
     point.time_from_start.sec, point.time_from_start.nanosec = divmod(round(1e9 * dt), 10**9)
     trajectory.joint_names, trajectory.points = list(joints), [point]
     return trajectory
@@ -42,8 +41,7 @@ def write_command(trajectory, point, joints, state, action, dt):
 
 # %%
 # The node. Where a message lacks a joint it says so and sends nothing: the controller then holds the arm at the last
-# point. A compiled policy acts anywhere: mind where the arm is when you start it, and let the controller keep its
-# limits.
+# point. A compiled policy acts anywhere, so mind where the arm is at the start; limits are the controller's to keep.
 
 
 def main(path, joints, dt=0.1):

@@ -37,7 +37,7 @@ class HandFeatures(BaseEstimator):
     """The features of `π(q) = J⁺(q) W b(p(q)) + (I - J⁺J)(r + s ∘ q)`: of a hand's velocity, and a pull on the posture.
 
     States are joint positions and actions joint velocities, both in the order of `robot.joints`. Contact is inferred
-    in joint space, or given by `constraints.from_normals` or `from_forces` with the Jacobian. A policy of these features
+    in joint space, or given by `constraints.from_normals` or `from_forces` with the Jacobian. A policy of them
     holds the robot, which files do not: save what `hand` returns.
 
     Parameters

@@ -56,7 +56,7 @@ model = spec.compile()
 
 HOME = np.array([0.0, -0.5, 0.0, -2.2, 0.0, 1.75, 0.78])
 GOAL = np.array([0.5, 0.25, 0.2])
-MOVEMENTS, SECONDS = 36, 2.2
+MOVEMENTS, SECONDS = 60, 2.2
 
 
 def lead(place):
@@ -119,16 +119,16 @@ print(*demos.notes, sep="\n")
 features = uc.robots.HandFeatures(panda, TIP, uc.NormalizedRBF(15))
 
 # %%
-# Three ways to learn it from the first 28 movements: by ordinary regression; by inferring what was free; and by being
+# Three ways to learn it from the first 48 movements: by ordinary regression; by inferring what was free; and by being
 # told by the sensor, through the Jacobian, which direction the board took away. The simulation knows what the person
-# wanted, so the other eight movements show how wrong each is.
+# wanted, so the other twelve movements show how wrong each is.
 
 J = panda.jacobian(demos.states, TIP)[:, :3]
 forces = np.loadtxt("panda.csv", delimiter=",", skiprows=1)[:, -3:]
 known = uc.constraints.from_forces(
     forces, 2.0, actions=demos.actions, jacobian=J, episodes=demos.episodes, margin=1
 )
-new = demos.episodes >= 28
+new = demos.episodes >= 48
 truth = wanted(demos.states, panda.pose(demos.states, TIP)[0], J)
 ways = {
     "ordinary regression": ("direct", None),

@@ -145,7 +145,8 @@ for name, log in runs.items():
         f"  of the 2 ms a step took {log['clock'].mean():.2f} ms in the mean; 99 % took at most {clock:.2f} ms by the "
         f"clock, {processor:.2f} ms of the processor"
     )
-print(f"nearest to the wall: {100 * runs['with the wall']['distance'].min():.1f} cm")
+nearest = runs["with the wall"]["distance"].min()
+print(f"nearest to the wall: {1e3 * nearest:.1f} mm, where {1e3 * CLEARANCE:.0f} mm were asked for")
 
 # %%
 # A rollout knows no inertia, no servos and no limits. How far the arm's dynamics take the hand from it, without a

@@ -1,7 +1,9 @@
 """The node of the gallery converts ROS 2's messages, of which rosbags has the definitions, without ROS."""
 
 import runpy
+import sys
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -61,3 +63,36 @@ def test_the_command_is_a_step_ahead_and_names_its_joints():
     assert trajectory.joint_names == JOINTS
     assert (point.time_from_start.sec, point.time_from_start.nanosec) == (1, 250_000_000)
     np.testing.assert_allclose(trajectory.points[0].positions, state + 1.25 * action)
+
+
+def test_the_node_acts_on_a_whole_message_and_reports_another(tmp_path, monkeypatch):
+    X = np.random.default_rng(0).normal(size=(50, 3))
+    policy = uc.ParametricPolicy(risk="direct").fit(X, -X)
+    policy.compile().save(tmp_path / "step.npz")
+    sent, errors = [], []
+    whole = joint_state(elbow=2.0, wrist=3.0, shoulder=1.0)
+
+    def create_node(name):
+        logger = SimpleNamespace(error=lambda text, **_: errors.append(text))
+        return SimpleNamespace(
+            create_publisher=lambda kind, topic, depth: SimpleNamespace(publish=sent.append),
+            create_subscription=lambda kind, topic, act, depth: [act(joint_state(wrist=0.0)), act(whole)],
+            get_logger=lambda: logger,
+        )
+
+    for name, contents in {
+        "rclpy": {"init": lambda: None, "create_node": create_node, "spin": lambda node: None},
+        "sensor_msgs.msg": {"JointState": None},
+        "trajectory_msgs.msg": {
+            "JointTrajectory": SimpleNamespace,
+            "JointTrajectoryPoint": lambda: SimpleNamespace(time_from_start=SimpleNamespace()),
+        },
+    }.items():
+        module = ModuleType(name)
+        module.__dict__.update(contents)
+        monkeypatch.setitem(sys.modules, name.partition(".")[0], module)
+        monkeypatch.setitem(sys.modules, name, module)
+    NODE["main"](tmp_path / "step.npz", JOINTS, dt=0.1)
+    assert errors == ["the joint states have no position of shoulder, elbow: they have wrist"]
+    ((point,),) = [message.points for message in sent]
+    np.testing.assert_allclose(point.positions, [0.9, 1.8, 2.7], atol=1e-4)

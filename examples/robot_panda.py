@@ -145,6 +145,7 @@ for name, (risk, projections) in ways.items():
 learnt = policies["free inferred"]
 touched = np.linalg.norm(forces[~new], axis=1) > 2.0
 print(f"free: {1 - touched.mean():.0%} by the sensor, {learnt.free_share_:.0%} inferred without it")
+print(uc.identifiability(learnt, demos.states[~new], demos.actions[~new], groups=demos.episodes[~new]))
 
 # %%
 # Where each leads the hand from a start of its own. What follows is for `robot_wall.py`: the arm, the hand's policy

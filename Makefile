@@ -25,7 +25,7 @@ test-torch: $(VENV)/.torch
 # The site, out/site/index.html: runs every example, and reads the result in a browser (Debian's package chromium).
 # GALLERY=no leaves the examples unrun.
 docs: $(VENV)/.docs
-	rm -rf docs/api/generated out/site
+	rm -rf docs/api/generated out/site out/doctrees
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/sphinx-build --fail-on-warning --keep-going \
 		--doctree-dir out/doctrees docs out/site
 	$(BIN)/pytest tests/site

@@ -28,6 +28,12 @@ def test_formats(suffix, head, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == [f"a{suffix}"]
 
 
+def test_states_without_a_common_scale_are_followed_in_panels_of_their_own():
+    X = np.cumsum(np.ones((5, 2)), axis=0) * [1, 100]
+    for states, panels in ((X, 3), (X[:, :1], 1), (X / [1, 100], 2)):
+        assert len(figures.draw_rollout(uc.Demonstrations(states, states)).axes) == panels
+
+
 def test_a_resting_recording_can_be_drawn(tmp_path):
     demos = uc.Demonstrations(states=np.ones((5, 2)), actions=np.zeros((5, 2)))
     plot.save(plot.policy(lambda X: 0 * X, demos, ax=Figure().subplots()).figure, tmp_path / "rest.png")

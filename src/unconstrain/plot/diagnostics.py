@@ -55,7 +55,8 @@ def identifiability(
         Standard deviations between which the field's colour changes, in units of the action; by default the range there
         is.
     worst : int
-        Mark as many of the recorded states where the policy is known least: where to record next.
+        Mark so many of the recorded states where the policy is known least. What to record next is said by
+        `report.next_recordings`.
     ax : Axes, optional
         Where to draw; new axes by default. A colour bar takes some of their room.
 
@@ -183,7 +184,7 @@ def _mark_worst(ax: Any, report: Identifiability, shown: Sequence[int], worst: i
         mfc="none",
         mec=DIRECT,
         mew=2,
-        label="known least: record here",
+        label="known least",
         zorder=4,
         clip_on=is_in_space(ax),
     )

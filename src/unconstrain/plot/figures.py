@@ -10,7 +10,7 @@ from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.diagnostics.report import Identifiability
 from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
-from unconstrain.plot.columns import find_velocities
+from unconstrain.plot.columns import find_velocities, share_scale
 from unconstrain.plot.constraints import constraint
 from unconstrain.plot.contacts import contact
 from unconstrain.plot.diagnostics import identifiability
@@ -21,6 +21,8 @@ from unconstrain.policies.inferred import finds_no_contact
 
 MOST_COORDINATES = 3
 """Pairs of so many states are drawn, where there are more."""
+MOST_ALONE = 6
+"""So many states at most have panels of their own."""
 
 
 def draw_policy(learnt: Policy, demos: Demonstrations) -> Figure:
@@ -78,14 +80,25 @@ def draw_rollout(movement: Demonstrations, demos: Demonstrations | None = None) 
     Returns
     -------
     Figure
-        With two panels, or one of a single state.
+        With two panels, or one of a single state; states that share no scale have panels of their own.
     """
-    single = movement.states.shape[1] == 1
-    figure = Figure(figsize=(5.0 if single else 10.0, 4.4), layout="constrained")
-    panels = figure.subplots(1, 1 if single else 2, squeeze=False).ravel()
-    rollout(movement, demos, ax=panels[0])
-    if not single:
-        rollout(movement, against_time=True, ax=panels[1])
+    n = movement.states.shape[1]
+    figure = Figure(figsize=(5.0 if n == 1 else 10.0, 4.4), layout="constrained")
+    if n == 1:
+        rollout(movement, demos, ax=figure.subplots())
+        return figure
+    # Degrees over metres would make a flat line of the metres.
+    together = n > MOST_ALONE or share_scale(movement, range(n))
+    grid = figure.add_gridspec(1 if together else n, 2)
+    rollout(movement, demos, ax=figure.add_subplot(grid[:, 0]))
+    for i in range(1 if together else n):
+        ax = figure.add_subplot(grid[i, 1])
+        rollout(movement, coordinates=None if together else (i,), against_time=True, ax=ax)
+        if not together:
+            ax.set_title("")
+        if not together and i < n - 1:
+            ax.tick_params(labelbottom=False)
+            ax.set_xlabel("")
     return figure
 
 

@@ -128,7 +128,8 @@ def comparison(
     -------
     Axes
         As `policy` draws it, with the other one's arrows, broad, below those of the policy. The title has the root mean
-        square of their difference over the recorded states, as a share of that of the policy.
+        square of their difference over the recorded states, as a share of that of the policy, both in units of the
+        policy's `scale_`.
 
     Raises
     ------
@@ -143,6 +144,8 @@ def comparison(
     ax = draw_layers(layers, recorded, policy, coordinates, None, None, ax)
     X = recorded.states[thin_evenly(len(recorded), MOST_POINTS)]
     P, Q = predict(policy, X), predict(rival, X)
+    if isinstance(policy, Policy):  # degrees and metres have no common length otherwise
+        P, Q = policy.scaled(P), policy.scaled(Q)
     size = root_mean_square(P)
     if size > 0:
         apart = root_mean_square(P - Q)

@@ -8,7 +8,7 @@ OUTSIDE = r"\]\({up}(?!README\.md\)|CHANGELOG\.md\))([^)\s#]+)\)"
 
 
 def point(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Point a page's links to `../examples/x.py` to that example's page, and others to the repository.
+    """Point a page's links to `../examples/x.py` to that example's page, to their header the gallery, and others to the repository.
 
     On GitHub they lead to the file itself, and a site has no such files.
     """
@@ -16,6 +16,8 @@ def point(app: Sphinx, docname: str, source: list[str]) -> None:
 
     def target(link: re.Match[str]) -> str:
         path = link[1]
+        if path == "examples/GALLERY_HEADER.rst":
+            return f"]({'../' * depth}gallery/index.rst)"
         without_page = re.search(app.config.sphinx_gallery_conf["ignore_pattern"], path)
         if path.startswith("examples/") and path.endswith(".py") and not without_page:
             return f"]({'../' * depth}gallery/{path.removeprefix('examples/').removesuffix('.py')}.rst)"

@@ -8,9 +8,9 @@ OUTSIDE = r"\]\({up}(?!README\.md\)|CHANGELOG\.md\))([^)\s#]+)\)"
 
 
 def point(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Point a page's links to `../examples/x.py` to that example's page, to their header the gallery, and others to the repository.
+    """Point a page's links to `../examples/x.py` to that example's page, and others to the repository.
 
-    On GitHub they lead to the file itself, and a site has no such files.
+    The header of the examples is the gallery. On GitHub they lead to the file itself, and a site has no such files.
     """
     depth = docname.count("/")
 

@@ -5,6 +5,7 @@ import pytest
 
 import unconstrain as uc
 from unconstrain.evaluation.alternatives import choose_missing, try_alternatives
+from unconstrain.evaluation.fixed import find_fixed
 from unconstrain.evaluation.jumps import find_jumps
 from unconstrain.evaluation.turns import find_turn
 from unconstrain.limit_cycle import demonstrate
@@ -107,6 +108,14 @@ def test_motion_that_never_leaves_a_plane_says_nothing_of_the_policy_across_it()
     )
     found = uc.evaluate(uc.ParametricPolicy(risk="direct").fit(demos), demos)
     assert "1.000 u3 ≈ 0, so nothing is known of the policy across that" in found.verdict.sentence
+
+
+def test_metres_beside_degrees_are_not_taken_for_motion_that_never_is():
+    rng = np.random.default_rng(0)
+    x, scale = rng.normal(size=300), np.array([60.0, 0.2, 0.2])
+    demos = uc.Demonstrations(np.zeros((300, 3)), np.column_stack([rng.normal(size=300), x, 2 * x]) * scale)
+    assert len(find_fixed(demos)) == 2
+    assert find_fixed(demos, scale) == ("0.894 u2 - 0.447 u3 ≈ 0",)
 
 
 def reaches(rng):

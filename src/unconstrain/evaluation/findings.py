@@ -155,7 +155,7 @@ def collect(
         has_time=demos.time is not None,
         is_regression=policy.risk == "direct",
         in_doubt=is_in_doubt(policy),
-        fixed=find_fixed(demos),
+        fixed=find_fixed(demos, policy.scale_),
         n_actions=policy.n_actions_,
         tried=tuple(tried),
         missing=choose_missing(best, tried),

@@ -13,6 +13,7 @@ DEMOS = demonstrate(3, random_state=0)
 X, U = DEMOS.states, DEMOS.actions
 CYCLE = LimitCycle()
 DIRECT = uc.ParametricPolicy(risk="direct").fit(X, U)
+ADAPTIVE = uc.ParametricPolicy().fit(X, U)
 REPORT = uc.identifiability(DIRECT, X, U)
 
 
@@ -26,6 +27,12 @@ REPORT = uc.identifiability(DIRECT, X, U)
         (lambda: plot.demonstrations(X, coordinates=3.5), "coordinates must be two or three numbers"),
         (lambda: plot.demonstrations(X, coordinates=(1, 1)), "coordinates must be different ones"),
         (lambda: plot.demonstrations(X[:, 0]), "states must have shape"),
+        (lambda: plot.demonstrations(X, ax=mpl.figure.Figure()), "ax must be one axes of matplotlib"),
+        (
+            lambda: plot.contact(ADAPTIVE, DEMOS, ax=mpl.figure.Figure().add_subplot(projection="3d")),
+            "ax has 3 dimensions and this picture 2",
+        ),
+        (lambda: plot.save(mpl.figure.Figure().add_subplot(), "x.png"), "a figure is what ax.figure is"),
         (lambda: plot.demonstrations(X, groups=[1, 2]), "episodes have shape"),
         (lambda: plot.policy(CYCLE, X), "give the actions beside the states"),
         (lambda: plot.policy(CYCLE, DEMOS, U), "bring their own actions and episodes"),
@@ -62,3 +69,10 @@ def test_a_constraint_of_other_actions_is_not_drawn():
     learnt = uc.ConstantConstraint(1).fit(X, np.column_stack([U, U[:, 0]]))
     with pytest.raises(uc.errors.DataError, match="one of 3 actions, and the recordings have 2"):
         plot.constraint(learnt, DEMOS)
+
+
+def test_a_column_may_have_any_name():
+    names = [r"$\nosuch$ [m]", "a$b"]
+    ax = plot.demonstrations(uc.Demonstrations(X, U, state_names=names), ax=mpl.figure.Figure().add_subplot())
+    ax.figure.canvas.draw()
+    assert ax.get_xlabel() == r"\$\nosuch\$ [m]"

@@ -29,14 +29,24 @@ def get_axes(ax: Any, dimensions: int = 2) -> Any:
     ax : Axes, optional
         Where to draw.
     dimensions : int
-        Of new axes: 2 or 3.
+        Of the picture: 3 in space.
 
     Returns
     -------
     Axes
         The axes to draw on. matplotlib has no types for axes in three dimensions.
+
+    Raises
+    ------
+    DataError
+        What was given are no axes, or not of these dimensions.
     """
     if ax is not None:
+        if not isinstance(ax, Axes):
+            raise DataError(f"ax must be one axes of matplotlib, such as plt.subplots()[1], got {quote(ax)}")
+        if is_in_space(ax) != (dimensions == 3):
+            given, drawn = (3, 2) if is_in_space(ax) else (2, 3)
+            raise DataError(f"ax has {given} dimensions and this picture {drawn}: give other axes, or none")
         return ax
     from matplotlib import pyplot  # a picture on axes of one's own needs no backend, and no global state
 

@@ -1,8 +1,9 @@
 """What the numbers of a state are: names with units, which action is whose velocity, which of them share a scale."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from matplotlib.mathtext import MathTextParser
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.recordings.units import unit_in
@@ -56,12 +57,37 @@ def name_columns(demos: Demonstrations) -> list[str]:
     Returns
     -------
     list of str
-        A name for each state.
+        A name for each state, that can be drawn.
     """
+    names = escape(demos.state_names)
     return [
         name if unit == "" or unit_in(name) else f"{name} ({unit})"
-        for name, unit in zip(demos.state_names, _units(demos), strict=True)
+        for name, unit in zip(names, _units(demos), strict=True)
     ]
+
+
+def escape(names: Iterable[str]) -> list[str]:
+    """Make names drawable: dollar signs stay formulas where matplotlib can parse them, and are characters elsewhere.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Of columns.
+
+    Returns
+    -------
+    list of str
+        The names as matplotlib takes them.
+    """
+    return [name if "$" not in name or _is_formula(name) else name.replace("$", r"\$") for name in names]
+
+
+def _is_formula(name: str) -> bool:
+    try:
+        MathTextParser("path").parse(name)
+    except ValueError:
+        return False
+    return True
 
 
 def unit_of_speed(demos: Demonstrations, coordinates: Sequence[int]) -> str:

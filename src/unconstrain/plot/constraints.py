@@ -14,7 +14,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.plot.axes import check_coordinates, get_axes, label_axes
 from unconstrain.plot.colors import DIRECT
-from unconstrain.plot.columns import find_velocities
+from unconstrain.plot.columns import escape, find_velocities
 from unconstrain.plot.fields import draw_arrows, pick_columns, spread_samples
 from unconstrain.plot.movements import demonstrations
 from unconstrain.policies.inputs import as_demonstrations
@@ -77,7 +77,7 @@ def constraint(
     is_small = n in (2, 3) and None not in own
     if coordinates is None and not is_small:
         ax = get_axes(ax)
-        _draw_table(ax, A, demos.action_names)
+        _draw_table(ax, A, escape(demos.action_names))
         return ax
     if None in own:
         raise DataError(

@@ -13,7 +13,7 @@ from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.plot.axes import add_title, check_coordinates, get_axes, is_in_space, label_axes
 from unconstrain.plot.colors import DIRECT, LEARNT
-from unconstrain.plot.columns import name_columns
+from unconstrain.plot.columns import escape, name_columns
 from unconstrain.plot.movements import draw_lines
 from unconstrain.plot.thinning import split_episodes
 from unconstrain.policies.base import Policy
@@ -80,7 +80,7 @@ def contact(
     dots = _draw_dots(ax, places[rows], free[rows])
     ax.figure.colorbar(dots, ax=ax, label="probability that nothing was in the way", shrink=0.8)
     if single:
-        ax.set(xlabel=name_columns(demos)[0], ylabel=demos.action_names[0])
+        ax.set(xlabel=name_columns(demos)[0], ylabel=escape(demos.action_names)[0])
     else:
         label_axes(ax, demos, shown)
     add_title(ax, f"Inferred contact: {np.mean(free):.0%} of the samples were free")

@@ -13,7 +13,7 @@ from unconstrain.errors import DataError, PolicyError
 from unconstrain.plot.arrows import find_full_speed
 from unconstrain.plot.axes import add_title, check_coordinates, get_axes, label_axes
 from unconstrain.plot.colors import PALE, RECORDED
-from unconstrain.plot.columns import find_velocities, name_columns, share_scale, unit_of_speed
+from unconstrain.plot.columns import escape, find_velocities, name_columns, share_scale, unit_of_speed
 from unconstrain.plot.fields import (
     BEHIND,
     WIDTH,
@@ -169,7 +169,7 @@ def _draw_lines(
     line = np.linspace(low, high, 400)
     for layer in layers:
         ax.plot(line, predict(layer.policy, line[:, None]), color=layer.color, label=layer.label)
-    ax.set(xlabel=name_columns(demos)[0], ylabel=", ".join(demos.action_names))
+    ax.set(xlabel=name_columns(demos)[0], ylabel=", ".join(escape(demos.action_names)))
     if layers[-1].label is not None:
         add_title(ax, _title(layers))
     return ax

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from unconstrain import atomic
+from unconstrain.arrays import quote
 from unconstrain.errors import UnconstrainError
 
 if TYPE_CHECKING:
@@ -53,8 +54,12 @@ def save(figure: "Figure", path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     UnconstrainError
-        If the name ends in anything else, or cannot be written to.
+        If the name ends in anything else, or cannot be written to, or what is given is no figure.
     """
+    if not hasattr(figure, "savefig"):
+        raise UnconstrainError(
+            f"a figure is what ax.figure is, of the axes that were drawn on, not {quote(figure)}"
+        )
     check_suffix(path)
     path = Path(path)
     suffix = path.suffix.lower()

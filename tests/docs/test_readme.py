@@ -22,7 +22,7 @@ def printed(tmp_path_factory):
     (commands,) = re.findall(r"```sh\n(.*?)```", FIVE_MINUTES, flags=re.DOTALL)
     outputs = {}
     with contextlib.chdir(place):
-        for line in commands.strip().splitlines():
+        for line in commands.strip().replace("\\\n", "").splitlines():
             program, *arguments = shlex.split(line)
             assert program == "unconstrain"
             said = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")

@@ -32,7 +32,7 @@ recordings = uc.open(folder, state=["x", "y"], action=["u", "v"], episode="run")
 
 # %%
 # ``risk="corrected"`` finds the noise and takes away what it adds, in one pass. It is for recordings that are
-# mostly bent; the default finds out which samples were free, and reads them some dozen times.
+# mostly bent; the default finds out which samples were free, and reads them dozens of times.
 
 all_of_them = recordings.load()
 begun = time.perf_counter()

@@ -41,6 +41,13 @@ def test_a_fitted_policy_shows_what_it_found_above_scikit_learns_diagram():
         assert not hasattr(policy, "_repr_html_")
 
 
+def test_a_policy_saved_without_its_sums_shows_as_well(tmp_path):
+    uc.ParametricPolicy().fit(DEMOS).save(tmp_path / "policy.skops")
+    loaded = uc.load_policy(tmp_path / "policy.skops")
+    assert loaded._repr_html_().startswith("<table>")
+    assert "moments_" not in dir(loaded)
+
+
 def test_reports_and_comparisons_are_tables():
     policy = uc.ParametricPolicy().fit(DEMOS)
     report = uc.identifiability(policy, DEMOS)._repr_html_()

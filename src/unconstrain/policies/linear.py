@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_choice, check_number, check_states
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError, PolicyError
+from unconstrain.errors import DataError
 from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.calibration import Calibration
 from unconstrain.fitting.in_space import LinearInSpace
@@ -27,6 +27,7 @@ from unconstrain.fitting.posterior import Posterior
 from unconstrain.fitting.region import find_unit
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import check_input
+from unconstrain.policies.missing import MissingSumsError
 from unconstrain.policies.setting import settle
 from unconstrain.samples import Samples
 from unconstrain.spaces import Space
@@ -194,7 +195,7 @@ class LinearPolicy(Policy):
         """
         check_is_fitted(self)
         if not hasattr(self, "accumulator_"):
-            raise PolicyError(
+            raise MissingSumsError(
                 "this policy was saved without the sums it was solved from: save it with resumable=True to go on "
                 "learning, or to know how sure it is"
             )

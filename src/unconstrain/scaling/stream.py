@@ -67,10 +67,10 @@ def fit_stream(
     are dealt out to the episodes in the order in which they appear.
 
     With the adaptive risk the data are read as often as it takes to infer which samples were free: dozens of times,
-    and a hundred and more where that is slow to settle. Contact is inferred along episodes, which are samples with the same label that
-    follow each other, over the ends of batches and files too. So a block holds whole ones: where one is longer than
-    `batch_rows` it has more rows. Samples of batches without labels are taken one by one, and a single file without
-    episodes as the five into which it is cut for ``alpha="cv"``.
+    and a hundred and more where that is slow to settle. Contact is inferred along episodes, which are samples with
+    the same label that follow each other, over the ends of batches and files too. So a block holds whole ones:
+    where one is longer than `batch_rows` it has more rows. Samples of batches without labels are taken one by one,
+    and a single file without episodes as the five into which it is cut for ``alpha="cv"``.
 
     Parameters
     ----------

@@ -32,6 +32,7 @@ REPORT = uc.identifiability(DIRECT, X, U)
             lambda: plot.contact(ADAPTIVE, DEMOS, ax=mpl.figure.Figure().add_subplot(projection="3d")),
             "ax has 3 dimensions and this picture 2",
         ),
+        (lambda: plot.rollout(np.zeros((3, 3)), DEMOS), "the movement has 3 states, and the recordings 2"),
         (lambda: plot.save(mpl.figure.Figure().add_subplot(), "x.png"), "a figure is what ax.figure is"),
         (lambda: plot.demonstrations(X, groups=[1, 2]), "episodes have shape"),
         (lambda: plot.policy(CYCLE, X), "give the actions beside the states"),

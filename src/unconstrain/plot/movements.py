@@ -117,7 +117,10 @@ def rollout(
     """
     movement = as_demonstrations(movement, None, None, actions_needed=False)
     n = movement.states.shape[1]
-    if isinstance(demos, Demonstrations) and demos.states.shape[1] == n:
+    recorded = None if demos is None else as_demonstrations(demos, None, None, actions_needed=False)
+    if recorded is not None and recorded.states.shape[1] != n:
+        raise DataError(f"the movement has {n} states, and the recordings {recorded.states.shape[1]}")
+    if isinstance(demos, Demonstrations):
         movement = replace(movement, state_names=demos.state_names)  # which say more than x1, x2
     if against_time:
         chosen = list(range(n)) if coordinates is None else coordinates
@@ -127,7 +130,6 @@ def rollout(
         return _draw_all_over_time(movement, chosen, get_axes(ax))
     shown = check_coordinates(coordinates, n, ax)
     ax = get_axes(ax, len(shown))
-    recorded = None if demos is None else as_demonstrations(demos, None, None, actions_needed=False)
     in_time = len(shown) == 1
     if recorded is not None and not (in_time and recorded.time is None):
         demonstrations(recorded, coordinates=coordinates, ax=ax)

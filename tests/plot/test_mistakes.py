@@ -77,3 +77,8 @@ def test_a_column_may_have_any_name():
     ax = plot.demonstrations(uc.Demonstrations(X, U, state_names=names), ax=mpl.figure.Figure().add_subplot())
     ax.figure.canvas.draw()
     assert ax.get_xlabel() == r"\$\nosuch\$ [m]"
+
+
+def test_axes_may_be_logarithmic():
+    ax = mpl.figure.Figure().add_subplot(xscale="log")
+    assert plot.demonstrations(np.abs(X) + 0.1, ax=ax).get_xscale() == "log"

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D, ScaledTranslation, blended_transform_factory
 from numpy.typing import NDArray
 
@@ -109,7 +110,9 @@ def label_axes(ax: Any, demos: Demonstrations, coordinates: Sequence[int]) -> No
     names = name_columns(demos)
     for axis, i in zip("xyz", coordinates, strict=False):
         ax.set(**{f"{axis}label": names[i]})
-    ax.locator_params(nbins=5 if is_in_space(ax) else 6)  # more of them overlap
+        locator = getattr(ax, f"{axis}axis").get_major_locator()
+        if isinstance(locator, MaxNLocator):  # and no logarithmic one, of the user's
+            locator.set_params(nbins=5 if is_in_space(ax) else 6)  # more of them overlap
     if share_scale(demos, coordinates):
         # The box gives way and not the limits, which are the user's to set.
         ax.set_aspect("equal", adjustable="box")

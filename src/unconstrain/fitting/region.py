@@ -120,8 +120,7 @@ class Region:
     @property
     def _middles(self) -> Array:
         """The middles of the boxes in units."""
-        moved = sum(2.0**level for level in range(self.coarseness) if _shift(level))
-        return (self.boxes + 0.5) * self._edge - moved * FINEST
+        return (self.boxes + 0.5) * self._edge - _shift(0, self.coarseness) * FINEST
 
 
 def find_unit(Z: Array, width: float | Array | None) -> Array:
@@ -183,16 +182,17 @@ def find_apart(regions: Sequence[Region | None]) -> float:
     )
 
 
-def _shift(coarseness: int) -> int:
-    """Return by how many boxes of this coarseness the next coarser ones begin earlier, so that zero is no wall."""
-    return 1 - coarseness % 2
+def _shift(coarseness: int, wanted: int) -> float:
+    """Return by how many boxes of a coarseness those of another begin earlier, so that zero is no wall."""
+    return sum(2.0 ** (level - coarseness) for level in range(coarseness, wanted) if level % 2 == 0)
 
 
 def _coarser(boxes: NDArray[Any], coarseness: int, wanted: int) -> Array:
-    boxes = boxes.astype(np.float64)
-    for level in range(coarseness, wanted):
-        boxes = np.floor((boxes + _shift(level)) / 2.0)
-    return boxes
+    boxes = boxes.astype(np.float64, copy=False)
+    if wanted == coarseness:
+        return boxes
+    # Halving and rounding down level by level is one division, rounded down once.
+    return np.floor((boxes + _shift(coarseness, wanted)) * 2.0 ** (coarseness - wanted))
 
 
 def _as_few(boxes: Array, coarseness: int) -> tuple[NDArray[Any], int]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.features.scaling import Scaling
+from unconstrain.fitting.kernels import fast
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,9 @@ FINEST = 0.25
 
 MOST_BOXES = 512
 """Beyond so many, boxes become coarser."""
+
+SEVERAL = 8
+"""How many times as many boxes are told apart before they become coarser."""
 
 LARGEST = 2.0**62
 """Number of a box beyond which there is no telling it from the next."""
@@ -68,6 +72,13 @@ class Region:
         Region
             Of these states.
         """
+        compiled = fast.load_for(len(Z))
+        if compiled is not None:
+            rows = np.empty(SEVERAL * MOST_BOXES, dtype=np.int64)
+            found = compiled.first_rows(
+                Z, FINEST * unit, _shift(0, coarseness), 2.0**-coarseness, LARGEST, rows
+            )
+            Z = Z if found < 0 else Z[rows[:found]]
         with np.errstate(over="ignore"):
             boxes = np.clip(np.floor(Z / (FINEST * unit)), -LARGEST, LARGEST)
         return cls(unit, *_as_few(_coarser(boxes, 0, coarseness), coarseness))
@@ -184,7 +195,8 @@ def find_apart(regions: Sequence[Region | None]) -> float:
 
 def _shift(coarseness: int, wanted: int) -> float:
     """Return by how many boxes of a coarseness those of another begin earlier, so that zero is no wall."""
-    return sum(2.0 ** (level - coarseness) for level in range(coarseness, wanted) if level % 2 == 0)
+    earlier = (2.0 ** (level - coarseness) for level in range(coarseness, wanted) if level % 2 == 0)
+    return sum(earlier, 0.0)
 
 
 def _coarser(boxes: NDArray[Any], coarseness: int, wanted: int) -> Array:

@@ -1,0 +1,71 @@
+"""Loops that numba compiles give what NumPy gives."""
+
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import unconstrain as uc
+from unconstrain.features import FullFeatures
+from unconstrain.fitting.kernels import fast, parametric, reference
+from unconstrain.fitting.observation import observe
+from unconstrain.fitting.region import Region
+
+pytest.importorskip("numba")
+
+
+@pytest.fixture(autouse=True)
+def however_few(monkeypatch):
+    monkeypatch.setattr(fast, "WORTH", 0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    n=st.integers(1, 9), d=st.integers(2, 8), N=st.integers(1, 400), single=st.booleans(), weighed=st.booleans(),
+    seed=st.integers(0, 99),
+)  # fmt: skip
+def test_moments_are_those_of_the_equations(n, d, N, single, weighed, seed):
+    rng = np.random.default_rng(seed)
+    X, U = rng.normal(size=(N, n)), rng.normal(size=(N, d)) * rng.choice([0.0, 1.0, 30.0], size=(N, 1))
+    X, U = (np.asfortranarray(each.astype(np.float32 if single else np.float64)) for each in (X, U))
+    weights = rng.choice([0.0, 0.5, 2.0], size=N) if weighed else None
+    features, observation = FullFeatures().fit(X.astype(float), d), observe("inconsistency", U)
+    exact = reference.moments(features, X, observation, weights)
+    found = parametric.of_tiles(fast.load(), features, X, observation, weights)
+    for name in ("H", "g", "squares", "weight"):
+        expected = getattr(exact, name)
+        np.testing.assert_allclose(
+            getattr(found, name), expected, rtol=1e-9, atol=1e-11 * (1 + np.abs(expected).max())
+        )
+    assert found.n_samples == N
+
+
+@pytest.mark.parametrize("n", [1, 3, 9])
+@pytest.mark.parametrize("coarseness", [0, 2, 5])
+def test_boxes_are_those_of_numpy(n, coarseness, monkeypatch):
+    rng = np.random.default_rng(n)
+    Z = rng.normal(size=(20_000, n)) * rng.uniform(0.1, 30, size=n)
+    Z[0], Z[1] = 1e300, -1e300
+    unit = rng.uniform(0.5, 2.0, size=n)
+    found = Region.of(Z, unit, coarseness)
+    monkeypatch.setattr(fast, "WORTH", np.inf)
+    plain = Region.of(Z, unit, coarseness)
+    assert found.coarseness == plain.coarseness
+    np.testing.assert_array_equal(found.boxes, plain.boxes)
+
+
+def test_without_numba_the_fit_is_the_same(monkeypatch):
+    rng = np.random.default_rng(0)
+    X, U = rng.normal(size=(2, 5000, 3))
+    fits = []
+    for there in (True, False):
+        fast.load.cache_clear()
+        if not there:
+            monkeypatch.setitem(sys.modules, "unconstrain.fitting.kernels.jit", None)
+            monkeypatch.delattr("unconstrain.fitting.kernels.jit", raising=False)
+            assert fast.load() is None
+        fits.append(uc.ParametricPolicy(alpha=0.1, risk="inconsistency").fit(X, U).predict(X[:9]))
+    fast.load.cache_clear()
+    np.testing.assert_allclose(*fits, rtol=1e-9)

@@ -12,7 +12,7 @@ from unconstrain.recordings.blocks import Block, Loaded
 from unconstrain.recordings.pieces import Piece
 
 Load = Callable[[Sequence[Piece], int, Piece | None], Loaded]
-"""Makes samples of pieces, the first of which begins at a row, after the last row of the block before, where there is one."""
+"""Makes samples of pieces, given the number of their first row, and the last row before it, if there is one."""
 
 Labels = Callable[[Piece, int], NDArray[Any]]
 """Returns what must not be torn apart, (N,), of a piece that begins at a row."""

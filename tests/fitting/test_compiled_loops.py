@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import unconstrain as uc
 from unconstrain.features import FullFeatures
+from unconstrain.fitting.chain import Chain, smooth
 from unconstrain.fitting.kernels import fast, parametric, reference
 from unconstrain.fitting.observation import observe
 from unconstrain.fitting.region import Region
@@ -54,6 +55,18 @@ def test_boxes_are_those_of_numpy(n, coarseness, monkeypatch):
     plain = Region.of(Z, unit, coarseness)
     assert found.coarseness == plain.coarseness
     np.testing.assert_array_equal(found.boxes, plain.boxes)
+
+
+def test_the_chain_is_that_of_numpy(monkeypatch):
+    rng = np.random.default_rng(0)
+    logs, starts = rng.normal(size=(2, 3000)) * 10, rng.random(3000) < 0.01
+    logs[0, 5:9] = -np.inf
+    found = smooth(*logs, starts, Chain())
+    monkeypatch.setattr(fast, "WORTH", np.inf)
+    plain = smooth(*logs, starts, Chain())
+    np.testing.assert_allclose(found[0], plain[0], atol=1e-12)
+    np.testing.assert_allclose(found[1], plain[1], rtol=1e-9)
+    np.testing.assert_allclose(found[3], plain[3], atol=1e-12)
 
 
 def test_without_numba_the_fit_is_the_same(monkeypatch):

@@ -17,7 +17,7 @@ SERIES_TERMS = 1000
 """More than the power series takes wherever the Bessel function itself underflows."""
 
 FAR = 40.0
-"""From κ = FAR + max(ν, 1)² / 2 on the expansion for large κ is exact in double precision, and a quarter of the work."""
+"""From κ = FAR + max(ν, 1)² / 2 on the expansion for large κ is exact in double precision, and faster."""
 
 TERMS = 20
 """Of that expansion; fewer where κ is larger."""

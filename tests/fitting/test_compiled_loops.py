@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import unconstrain as uc
 from unconstrain.features import FullFeatures
 from unconstrain.fitting.chain import Chain, smooth
-from unconstrain.fitting.kernels import fast, parametric, reference
+from unconstrain import loops
+from unconstrain.fitting.kernels import parametric, reference
 from unconstrain.fitting.observation import observe
 from unconstrain.fitting.region import Region
 
@@ -19,7 +20,7 @@ pytest.importorskip("numba")
 
 @pytest.fixture(autouse=True)
 def however_few(monkeypatch):
-    monkeypatch.setattr(fast, "WORTH", 0)
+    monkeypatch.setattr(loops, "WORTH", 0)
 
 
 @settings(max_examples=25, deadline=None)
@@ -34,7 +35,7 @@ def test_moments_are_those_of_the_equations(n, d, N, single, weighed, seed):
     weights = rng.choice([0.0, 0.5, 2.0], size=N) if weighed else None
     features, observation = FullFeatures().fit(X.astype(float), d), observe("inconsistency", U)
     exact = reference.moments(features, X, observation, weights)
-    found = parametric.of_tiles(fast.load(), features, X, observation, weights)
+    found = parametric.of_tiles(loops.load("moments"), features, X, observation, weights)
     for name in ("H", "g", "squares", "weight"):
         expected = getattr(exact, name)
         np.testing.assert_allclose(
@@ -51,7 +52,7 @@ def test_boxes_are_those_of_numpy(n, coarseness, monkeypatch):
     Z[0], Z[1] = 1e300, -1e300
     unit = rng.uniform(0.5, 2.0, size=n)
     found = Region.of(Z, unit, coarseness)
-    monkeypatch.setattr(fast, "WORTH", np.inf)
+    monkeypatch.setattr(loops, "WORTH", np.inf)
     plain = Region.of(Z, unit, coarseness)
     assert found.coarseness == plain.coarseness
     np.testing.assert_array_equal(found.boxes, plain.boxes)
@@ -62,7 +63,7 @@ def test_the_chain_is_that_of_numpy(monkeypatch):
     logs, starts = rng.normal(size=(2, 3000)) * 10, rng.random(3000) < 0.01
     logs[0, 5:9] = -np.inf
     found = smooth(*logs, starts, Chain())
-    monkeypatch.setattr(fast, "WORTH", np.inf)
+    monkeypatch.setattr(loops, "WORTH", np.inf)
     plain = smooth(*logs, starts, Chain())
     np.testing.assert_allclose(found[0], plain[0], atol=1e-12)
     np.testing.assert_allclose(found[1], plain[1], rtol=1e-9)
@@ -74,11 +75,11 @@ def test_without_numba_the_fit_is_the_same(monkeypatch):
     X, U = rng.normal(size=(2, 5000, 3))
     fits = []
     for there in (True, False):
-        fast.load.cache_clear()
+        loops.load.cache_clear()
         if not there:
-            monkeypatch.setitem(sys.modules, "unconstrain.fitting.kernels.jit", None)
-            monkeypatch.delattr("unconstrain.fitting.kernels.jit", raising=False)
-            assert fast.load() is None
+            monkeypatch.setitem(sys.modules, "unconstrain.loops.moments", None)
+            monkeypatch.delattr("unconstrain.loops.moments", raising=False)
+            assert loops.load("moments") is None
         fits.append(uc.ParametricPolicy(alpha=0.1, risk="inconsistency").fit(X, U).predict(X[:9]))
-    fast.load.cache_clear()
+    loops.load.cache_clear()
     np.testing.assert_allclose(*fits, rtol=1e-9)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.fitting.kernels import fast
+from unconstrain import loops
 
 Floats = NDArray[np.float64]
 
@@ -171,7 +171,7 @@ def _sweep(steps: Floats) -> Floats:
     row that each begins with, then the rows within.
     """
     N = len(steps)
-    compiled = fast.load_for(N)
+    compiled = loops.load_for(N, "chain")
     if compiled is not None:
         swept = np.empty((N, 2))
         compiled.sweep(steps, swept)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain import loops
 from unconstrain.features.scaling import Scaling
-from unconstrain.fitting.kernels import fast
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class Region:
         Region
             Of these states.
         """
-        compiled = fast.load_for(len(Z))
+        compiled = loops.load_for(len(Z), "grid")
         if compiled is not None:
             rows = np.empty(SEVERAL * MOST_BOXES, dtype=np.int64)
             found = compiled.first_rows(

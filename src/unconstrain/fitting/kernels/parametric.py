@@ -9,8 +9,8 @@ from types import ModuleType
 
 import numpy as np
 
+from unconstrain import loops
 from unconstrain.features.base import Features, FullBasis
-from unconstrain.fitting.kernels import fast
 from unconstrain.fitting.kernels.blocks import (
     SAMPLES_IN_PIECE,
     Totals,
@@ -66,7 +66,7 @@ def moments(
     # Products halve the arithmetic; they pay as long as making them is no more work than making V.
     if k > 1 or n_pairs(M) + n_pairs(d) <= 2 * d * M:
         if isinstance(observation, AlongMotion) and n_pairs(M) * n_pairs(d) <= NARROW:
-            compiled = fast.load_for(len(X))
+            compiled = loops.load_for(len(X), "moments")
             if compiled is not None:
                 return of_tiles(compiled, features, X, observation, weights)
         return of_products(features, X, observation, weights)
@@ -124,7 +124,7 @@ def of_tiles(
     Parameters
     ----------
     compiled : module
-        As `fast.load` returns it.
+        `loops.moments`.
     features : FullBasis
         Fitted.
     X : ndarray of shape (N, n)

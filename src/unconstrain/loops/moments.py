@@ -1,28 +1,11 @@
-"""Inner loops that numba compiles; `fast.load` imports them where it is installed (extra `fast`).
-
-Each has its counterpart in NumPy beside what calls it, which is what runs without numba and what tests compare with.
-"""
-
-from collections.abc import Callable
-from typing import Any
+"""Moments of samples that are seen along their motion, made and added up tile by tile."""
 
 import numpy as np
-from numba import njit
+
+from unconstrain.loops.compiling import compiled
 
 SAMPLES = 128
 """In a tile: all that is made of them stays in a core's innermost caches."""
-
-REORDER = {"reassoc", "contract", "arcp", "nsz"}
-"""Sums may be taken in any order, or they could not be taken several at a time. NaN and infinity stay what they are."""
-
-
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function when it is first called, and keep the result on disk where there is a place for it."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": REORDER, "error_model": "numpy"}
-    try:
-        return njit(cache=True, **options)(function)
-    except RuntimeError:  # nowhere to keep it
-        return njit(**options)(function)
 
 
 @compiled
@@ -128,78 +111,3 @@ def add_along_motion(
                 C[q, t] = directions[k, t] * weighed[m, t]
         add_product(A, C, products)
         add_product(pulled, basis, pulls)
-
-
-@compiled
-def first_rows(
-    Z: np.ndarray, edge: np.ndarray, shift: float, factor: float, limit: float, rows: np.ndarray
-) -> int:
-    """Find the first state in each box of a grid.
-
-    Parameters
-    ----------
-    Z : ndarray of shape (N, m)
-        States, of any precision.
-    edge : ndarray of shape (m,)
-        Of the finest boxes; those asked for are `floor((floor(z / edge) + shift) factor)`.
-    shift, factor, limit : float
-        Finest boxes are numbered up to `limit`.
-    rows : ndarray of shape (K,), int64
-        Written to: the indices of the states found.
-
-    Returns
-    -------
-    int
-        How many; -1 where there are more than K.
-    """
-    N, m = Z.shape
-    places = 4 * len(rows)  # a power of two
-    table = np.full(places, -1, np.int64)
-    boxes = np.empty((len(rows), m))
-    box = np.empty(m)
-    found = 0
-    for n in range(N):
-        mixed = np.uint64(0)
-        for j in range(m):
-            finest = min(max(np.floor(np.float64(Z[n, j]) / edge[j]), -limit), limit)
-            box[j] = np.floor((finest + shift) * factor)
-            mixed = (mixed + np.uint64(np.int64(box[j]))) * np.uint64(0x9E3779B97F4A7C15)
-            mixed ^= mixed >> np.uint64(29)
-        at = np.int64(mixed & np.uint64(places - 1))
-        while table[at] >= 0:
-            same = True
-            for j in range(m):
-                if boxes[table[at], j] != box[j]:
-                    same = False
-                    break
-            if same:
-                break
-            at = (at + 1) & (places - 1)
-        if table[at] < 0:
-            if found == len(rows):
-                return -1
-            table[at] = found
-            boxes[found] = box
-            rows[found] = n
-            found += 1
-    return found
-
-
-@compiled
-def sweep(steps: np.ndarray, rows: np.ndarray) -> None:
-    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, from the row (1/2, 1/2).
-
-    Parameters
-    ----------
-    steps : ndarray of shape (N, 2, 2)
-        M.
-    rows : ndarray of shape (N, 2)
-        Written to.
-    """
-    a = b = 0.5
-    for t in range(len(steps)):
-        first = a * steps[t, 0, 0] + b * steps[t, 1, 0]
-        second = a * steps[t, 0, 1] + b * steps[t, 1, 1]
-        total = first + second
-        a, b = first / total, second / total
-        rows[t, 0], rows[t, 1] = a, b

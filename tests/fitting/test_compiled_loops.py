@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import unconstrain as uc
+from unconstrain import loops
 from unconstrain.features import FullFeatures
 from unconstrain.fitting.chain import Chain, smooth
-from unconstrain import loops
 from unconstrain.fitting.kernels import parametric, reference
 from unconstrain.fitting.observation import observe
 from unconstrain.fitting.region import Region
@@ -60,8 +60,8 @@ def test_boxes_are_those_of_numpy(n, coarseness, monkeypatch):
 
 def test_the_chain_is_that_of_numpy(monkeypatch):
     rng = np.random.default_rng(0)
-    logs, starts = rng.normal(size=(2, 3000)) * 10, rng.random(3000) < 0.01
-    logs[0, 5:9] = -np.inf
+    logs, starts = rng.normal(size=(2, 3000)) * 30, rng.random(3000) < 0.01
+    logs[0, 5:9], starts[0] = -np.inf, True
     found = smooth(*logs, starts, Chain())
     monkeypatch.setattr(loops, "WORTH", np.inf)
     plain = smooth(*logs, starts, Chain())

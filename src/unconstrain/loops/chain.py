@@ -5,7 +5,7 @@ import numpy as np
 from unconstrain.loops.compiling import compiled
 
 
-@compiled
+@compiled()
 def sweep(steps: np.ndarray, rows: np.ndarray) -> None:
     """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, from the row (1/2, 1/2).
 

@@ -9,10 +9,28 @@ REORDER = {"reassoc", "contract", "arcp", "nsz"}
 """Sums may be taken in any order, or they could not be taken several at a time. NaN and infinity stay what they are."""
 
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function when it is first called, and keep the result on disk where there is a place for it."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": REORDER, "error_model": "numpy"}
-    try:
-        return njit(cache=True, **options)(function)
-    except RuntimeError:  # nowhere to keep it
-        return njit(**options)(function)
+def compiled(*signature: Any, nogil: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Compile a function, and keep the result on disk where there is a place for it.
+
+    Parameters
+    ----------
+    *signature : numba type
+        Of the one kind of call that there is, for which it is compiled at once; without it the function is compiled
+        when it is first called.
+    nogil : bool
+        Whether other threads run meanwhile.
+
+    Returns
+    -------
+    callable
+        A decorator.
+    """
+    options: dict[str, Any] = {"nogil": nogil, "fastmath": REORDER, "error_model": "numpy"}
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        try:
+            return njit(*signature, cache=True, **options)(function)
+        except RuntimeError:  # nowhere to keep it
+            return njit(*signature, **options)(function)
+
+    return decorate

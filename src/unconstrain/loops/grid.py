@@ -5,7 +5,7 @@ import numpy as np
 from unconstrain.loops.compiling import compiled
 
 
-@compiled
+@compiled()
 def first_rows(
     Z: np.ndarray, edge: np.ndarray, shift: float, factor: float, limit: float, rows: np.ndarray
 ) -> int:

@@ -8,7 +8,7 @@ SAMPLES = 128
 """In a tile: all that is made of them stays in a core's innermost caches."""
 
 
-@compiled
+@compiled()
 def add_product(A: np.ndarray, C: np.ndarray, S: np.ndarray) -> None:
     """Add `A Cᵀ` of a tile to S, four by four, so that what is loaded is used four times.
 
@@ -50,7 +50,7 @@ def add_product(A: np.ndarray, C: np.ndarray, S: np.ndarray) -> None:
             S[p + 3, q + 3] += s33
 
 
-@compiled
+@compiled()
 def add_along_motion(
     B: np.ndarray,
     U: np.ndarray,

@@ -25,12 +25,13 @@ def compiled(*signature: Any, nogil: bool = True) -> Callable[[Callable[..., Any
     callable
         A decorator.
     """
+    make: Any = njit
     options: dict[str, Any] = {"nogil": nogil, "fastmath": REORDER, "error_model": "numpy"}
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         try:
-            return njit(*signature, cache=True, **options)(function)
+            return make(*signature, cache=True, **options)(function)
         except RuntimeError:  # nowhere to keep it
-            return njit(*signature, **options)(function)
+            return make(*signature, **options)(function)
 
     return decorate

@@ -108,7 +108,7 @@ class Controls:
 
     def _add_others(self) -> None:
         """Add a slider for each number that is not shown, by which the start is moved along it."""
-        page, stage = self.page, self.page.stage
+        stage = self.page.stage
         self.others: list[Any] = []
         if not isinstance(stage.coordinates, Picked) or len(stage.axes.names) < 3:
             return

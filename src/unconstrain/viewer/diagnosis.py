@@ -57,7 +57,7 @@ class Diagnosis:
             self.words = "Without recordings it is not known what they determine."
             return
         try:
-            report = identifiability(stage.policies[LEARNT], self._demos)  # type: ignore[arg-type]
+            report = identifiability(stage.policies[LEARNT], self._demos)
             self._planned = report.next_recordings(NEXT)
         except UnconstrainError as error:
             self.words = f"Not known: {error}."
@@ -89,7 +89,7 @@ class Diagnosis:
         for k, each in enumerate(self._planned, 1):
             x = each.state[None]
             at = stage.places(x, lift=LIFT)[0]
-            along = stage.frame.vectors((stage.coordinates.tangents(x) @ each.direction))[0]
+            along = stage.frame.vectors(stage.coordinates.tangents(x) @ each.direction)[0]
             along *= ARROW * extent / (float(np.linalg.norm(along)) or 1.0)
             self._handles += [
                 scene.add_arrows(
@@ -100,7 +100,9 @@ class Diagnosis:
                     head_radius=0.018 * extent,
                     head_length=0.035 * extent,
                 ),
-                scene.add_label(f"/next/{k}/label", f"record next: {k}", position=tuple(at), anchor="bottom-left"),
+                scene.add_label(
+                    f"/next/{k}/label", f"record next: {k}", position=tuple(at), anchor="bottom-left"
+                ),
             ]
 
 
@@ -130,7 +132,7 @@ def _ellipsoids(stage: Stage, places: Array, lengths: Array, vectors: Array) -> 
         batched_wxyzs=Rotation.from_matrix(right_handed).as_quat(scalar_first=True),
         batched_positions=places,
         batched_scales=np.maximum(lengths, 0.02 * lengths.max()).astype(np.float32),
-        batched_colors=palette.rgb(palette.UNKNOWN),
+        batched_colors=palette.linear(np.array(palette.rgb(palette.UNKNOWN))),
         opacity=0.35,
         lod="off",
         cast_shadow=False,
@@ -153,7 +155,9 @@ def ball(around: int = 16, rings: int = 8) -> tuple[Array, NDArray[np.uint32]]:
     faces : ndarray of shape (F, 3)
         Triangles of them.
     """
-    polar, azimuth = np.meshgrid(np.linspace(0, np.pi, rings + 1), 2 * np.pi * np.arange(around) / around, indexing="ij")
+    polar, azimuth = np.meshgrid(
+        np.linspace(0, np.pi, rings + 1), 2 * np.pi * np.arange(around) / around, indexing="ij"
+    )
     vertices = np.stack(
         [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
     ).reshape(-1, 3)

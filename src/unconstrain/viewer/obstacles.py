@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from unconstrain.viewer import palette
 from unconstrain.viewer.barriers import Barrier, Box, Plane
+from unconstrain.viewer.frame import Frame
 from unconstrain.viewer.stage import Stage
 
 Array = NDArray[np.float64]
@@ -34,16 +35,17 @@ class Obstacles:
         self._handles: dict[str, Any] = {}
         self._body: Any = None
         self._stage: Stage | None = None
+        self._frame: Frame | None = None
         self.chosen = NOTHING
         self.sides = np.ones(3)
 
     def draw(self, stage: Stage) -> None:
         """Draw those that are chosen, anew if what is shown changed; see `Part`."""
-        if self._stage is not stage or self._of_frame is not stage.frame:
+        if self._stage is not stage or self._frame is not stage.frame:
             self.sides = np.full(3, BEGINS * stage.frame.extent)
             for handle in self._handles.values():
                 handle.remove()
-            self._handles, self._stage, self._of_frame = {}, stage, stage.frame
+            self._handles, self._stage, self._frame = {}, stage, stage.frame
         wanted = {PLANE: [PLANE], BOX: [BOX], BOTH: [PLANE, BOX]}.get(self.chosen, [])
         for name in (PLANE, BOX):
             if name in wanted and name not in self._handles:
@@ -107,7 +109,8 @@ class Obstacles:
             position=tuple(at),
             wxyz=_facing(begin - at) if name == PLANE else (1.0, 0.0, 0.0, 0.0),
         )
-        style = dict(color=palette.rgb(palette.HELD), opacity=0.35, cast_shadow=False, receive_shadow=False)
+        style: dict[str, Any] = {"opacity": 0.35, "cast_shadow": False, "receive_shadow": False}
+        style["color"] = palette.rgb(palette.HELD)
         if name == PLANE:
             high = 0.04 * extent if frame.is_flat else SHEET * extent
             sheet = (THIN * extent, SHEET * extent, high)

@@ -67,7 +67,8 @@ class Diagnosis:
         self.words = (
             f"Determined: {report.determined_share:.1%} of the policy's directions. "
             f"A recording at each marker, in which motion along its arrow is free, lessens the expected squared error "
-            f"of what is left: {lessens}."
+            f"of what is left: {lessens}. Ellipses are one standard deviation of the policy each way, drawn in "
+            "proportion to the root of their size."
         )
 
     def _draw_ellipses(self, stage: Stage, report: Identifiability) -> None:
@@ -95,7 +96,7 @@ class Diagnosis:
                 scene.add_arrows(
                     f"/next/{k}/arrow",
                     np.stack([[at - along / 2, at + along / 2], [at + along / 2, at - along / 2]]),
-                    palette.rgb(palette.HELD),
+                    palette.linear(np.array(palette.rgb(palette.HELD))),
                     shaft_radius=0.006 * extent,
                     head_radius=0.018 * extent,
                     head_length=0.035 * extent,

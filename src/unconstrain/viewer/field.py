@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.features.centers import farthest_first
 from unconstrain.spaces import SecondOrder
 from unconstrain.viewer import arrows, palette, streams
@@ -26,9 +27,16 @@ RECORDED, HELD = "recorded states", "the others as at the start"
 
 
 class Field:
-    """Arrows and stream lines of the policy that is shown."""
+    """Arrows and stream lines of the policy that is shown.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    demos : Demonstrations, optional
+        All recordings.
+    """
+
+    def __init__(self, demos: Demonstrations | None) -> None:
+        self._demos = demos
         self._arrows: Any = None
         self._streams: Any = None
         self._sureness: dict[str, Sureness] = {}
@@ -38,7 +46,7 @@ class Field:
     def sureness(self, stage: Stage) -> Sureness:
         """Return how sure the policy is that is shown."""
         if stage.name not in self._sureness:
-            self._sureness[stage.name] = Sureness(stage.policy)
+            self._sureness[stage.name] = Sureness(stage.policy, self._demos)
         return self._sureness[stage.name]
 
     def draw(self, stage: Stage) -> None:

@@ -125,7 +125,7 @@ def view(
     try:
         return Page(stage, demos, notes)
     except BaseException:
-        served.stop()
+        server.stop(served)
         raise
 
 

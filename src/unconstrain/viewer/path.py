@@ -39,6 +39,7 @@ class Path:
             "/path/now", radius=1.0, color=palette.rgb(palette.HELD)
         )
         self._end = stage.server.scene.add_icosphere("/path/end", radius=1.0, color=palette.rgb(palette.PATH))
+        self.draw(stage)
 
     def draw(self, stage: Stage) -> None:
         """Draw it anew where coordinates changed; see `Part`."""

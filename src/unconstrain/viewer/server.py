@@ -49,6 +49,18 @@ def start(host: str = HOST, port: int = PORT) -> Any:
     return server
 
 
+def stop(server: Any) -> None:
+    """End a server.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+        From `start`.
+    """
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a line of its own
+        server.stop()
+
+
 def check_port(host: str, port: int) -> None:
     """Raise `UnconstrainError` for a port that is taken: viser would take another, and say nothing."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as trial:

@@ -54,7 +54,7 @@ def _in_plane(stage: Stage) -> tuple[Array, Array]:
     U = stage.policy.predict(grid[:, order])[:, np.argsort(order)]
     u, v = U.T.reshape(2, CELLS, CELLS)
     ax = Figure().subplots()
-    drawn = ax.streamplot(x, y, u, v, density=DENSITY, arrowsize=0)
+    drawn = ax.streamplot(x, y, u, v, density=DENSITY, arrowstyle="-")
     lines = drawn.lines.get_segments()
     pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
     scene = stage.frame.to_scene(pieces.reshape(-1, 2)).reshape(-1, 2, 3)

@@ -48,7 +48,7 @@ class Surroundings:
             for k, value in enumerate(values):
                 at = corner + aside
                 at[axis] = frame.to_scene(np.full((1, len(low)), value))[0, axis]
-                self._label(scene, f"/ticks/{axis}/{k}", f"{round(value, 12):g}", at)
+                self._label(scene, f"/ticks/{axis}/{k}", f"{round(value, 12) + 0.0:g}", at)
             at = corner + 2.4 * aside
             at[axis] = frame.to_scene((low + high)[None] / 2.0)[0, axis]
             self._label(scene, f"/names/{axis}", stage.coordinates.names[axis], at, 1.2)

@@ -108,7 +108,7 @@ def view(
         policies[DIRECT] = other
     if isinstance(policy.space_, SecondOrder):
         notes.append(
-            "actions are accelerations, so there are no arrows over places; rollouts begin as recorded ones do"
+            "actions are accelerations, so there are no arrows over places, and nothing can be put in a rollout's way"
         )
     served = server.start(host, port)
     stage = Stage(

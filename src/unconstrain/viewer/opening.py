@@ -166,6 +166,8 @@ def _hand(
     hand = Hand(loaded, chosen, policy.space_, names)
     if site is None:
         notes.append(f"the robot's last frame, {chosen}, is taken for its hand; name another with site=")
+    elif len(loaded.frames) > 1:
+        notes.append(f"the place of {chosen} is shown")
     if not hand.by_name:
         pairs = ", ".join(f"{name} is {joint}" for name, joint in zip(names, loaded.joints, strict=False))
         notes.append(f"states are taken for the joints in their order, so {pairs}")

@@ -18,7 +18,7 @@ PLACES = 40
 
 def drag_freely() -> Ratio:
     """Drag the start of a policy of 50 local models."""
-    return _drag("view-drag", "a start dragged, 50 local models, 200 steps", NOTHING)
+    return _drag("view-drag", "a start dragged, 50 local models, 150 steps", NOTHING)
 
 
 def drag_among_barriers() -> Ratio:

@@ -12,6 +12,7 @@ import unconstrain as uc
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.limit_cycle import demonstrate
 from unconstrain.viewer import exporting
+from unconstrain.viewer.following import STEPS
 from unconstrain.viewer.newest import Newest
 from unconstrain.viewer.obstacles import BOTH, PLANE
 
@@ -55,7 +56,7 @@ def test_a_rollout_follows_what_is_dragged_free_or_not(page, policy):
     page.put_in_the_way("nothing")
     page.show_policy("ordinary regression")
     assert page.settle()
-    expected = policy.ordinary_regression().rollout(stage.start, 200, stage.seconds / 200, beyond=np.inf)
+    expected = policy.ordinary_regression().rollout(stage.start, STEPS, stage.seconds / STEPS, beyond=np.inf)
     np.testing.assert_allclose(stage.movement.states, expected.states[: len(stage.movement)], atol=1e-9)
     assert not any("must" in note for note in page.notes)
 

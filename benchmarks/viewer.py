@@ -14,6 +14,7 @@ from unconstrain.viewer.obstacles import BOTH, NOTHING
 
 FRAME = 1.0 / 30.0
 PLACES = 40
+SECONDS = 3.0
 
 
 def drag_freely() -> Ratio:
@@ -30,6 +31,7 @@ def _drag(name: str, work: str, in_the_way: str) -> Ratio:
     demos = toy.demonstrate(40, random_state=0)
     policy = uc.LocallyLinearPolicy(n_centers=50, alpha=1e-6, risk="inconsistency").fit(demos)
     page = uc.view(policy, demos, port=0)
+    page.set_seconds(SECONDS)
     page.put_in_the_way(in_the_way)
     page.settle()
     angles = np.linspace(0.0, 2 * np.pi, PLACES)

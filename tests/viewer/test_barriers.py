@@ -6,7 +6,7 @@ import pytest
 from unconstrain.spaces import Numbers
 from unconstrain.viewer.barriers import Box, InTheWay, Plane
 from unconstrain.viewer.coordinates import Axes, Picked
-from unconstrain.viewer.following import STEPS, Follower, Wanted, is_held
+from unconstrain.viewer.following import Follower, Wanted, is_held
 from unconstrain.viewer.frame import Frame
 
 WALL = Plane(np.zeros(3), np.array([1.0, 0.0, 0.0]))
@@ -58,13 +58,13 @@ def test_a_rollout_slides_along_a_plane_and_is_the_policys_elsewhere(policy):
     frame = Frame(np.zeros(2), 1.0, -np.ones(2), np.ones(2))
     follower, seen = Follower(policy), Picked(axes, [0, 1])
     start = np.array([0.7, 0.3])
-    free = follower.follow(Wanted(start, 2.0), seen, frame)
-    expected = policy.rollout(start, steps=STEPS, dt=2.0 / STEPS)
+    free = follower.follow(Wanted(start, 200, 0.01), seen, frame)
+    expected = policy.rollout(start, steps=200, dt=0.01)
     np.testing.assert_allclose(free.states, expected.states, atol=1e-9)
     assert follower.is_compiled
     assert free.states[:, 1].min() < -0.3
     floor = Plane(np.array([0.0, -0.2, 0.0]), np.array([0.0, 1.0, 0.0]))
-    held = follower.follow(Wanted(start, 2.0, [floor]), seen, frame)
+    held = follower.follow(Wanted(start, 200, 0.01, [floor]), seen, frame)
     touching = is_held(held)
     assert held.states[:, 1].min() >= -0.2
     assert 0.1 < touching.mean() < 0.9

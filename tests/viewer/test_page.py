@@ -12,7 +12,7 @@ import unconstrain as uc
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
 from unconstrain.limit_cycle import demonstrate
 from unconstrain.viewer import exporting
-from unconstrain.viewer.following import STEPS
+from unconstrain.viewer.following import choose_steps
 from unconstrain.viewer.newest import Newest
 from unconstrain.viewer.obstacles import BOTH, PLANE
 
@@ -56,9 +56,24 @@ def test_a_rollout_follows_what_is_dragged_free_or_not(page, policy):
     page.put_in_the_way("nothing")
     page.show_policy("ordinary regression")
     assert page.settle()
-    expected = policy.ordinary_regression().rollout(stage.start, STEPS, stage.seconds / STEPS, beyond=np.inf)
+    steps, dt = choose_steps(stage.seconds, stage.interval)
+    assert dt == pytest.approx(0.02)
+    expected = policy.ordinary_regression().rollout(stage.start, steps, dt, beyond=np.inf)
     np.testing.assert_allclose(stage.movement.states, expected.states[: len(stage.movement)], atol=1e-9)
-    assert not any("must" in note for note in page.notes)
+    assert page.notes == []
+
+
+def test_a_rollout_stops_where_nothing_was_recorded_unless_it_may_go_on(page):
+    above = np.array([0.0, 1.6 * page.stage.frame.extent, 0.0])
+    page.start.drag_to(page.stage.frame.middle + above)
+    assert page.settle()
+    assert len(page.stage.movement) == 1
+    assert '"May leave what was recorded" lets it go on.' in page.controls.ending.content
+    page.controls.anywhere.value = True
+    until = time.monotonic() + 10
+    while len(page.stage.movement) == 1:
+        assert time.monotonic() < until
+        time.sleep(0.02)
 
 
 def test_a_time_line_plays_and_tells_where_the_rollout_is(page):

@@ -7,6 +7,7 @@ import numpy as np
 from unconstrain.spaces import SecondOrder
 from unconstrain.viewer import exporting, field, legend, obstacles
 from unconstrain.viewer.coordinates import Picked
+from unconstrain.viewer.legend import ANYWHERE
 
 if TYPE_CHECKING:
     from unconstrain.viewer.page import Page
@@ -97,6 +98,8 @@ class Controls:
             if page.stage.under is not None:
                 self.under = gui.add_checkbox("Under the given constraint", True)
                 self.under.on_update(lambda event: page.follow_under(self.under.value))
+            self.anywhere = gui.add_checkbox(ANYWHERE, False)
+            self.anywhere.on_update(lambda event: page.lead_anywhere(self.anywhere.value))
             self.time = gui.add_slider("Time (s)", 0.0, page.stage.seconds, page.stage.seconds / 200.0, 0.0)
             self.time.on_update(self._sought)
             self.play = gui.add_button_group("Play", ("play", "pause", "to start"))

@@ -18,8 +18,9 @@ from unconstrain.viewer.frame import Frame
 
 Array = NDArray[np.float64]
 
-STEPS = 150
-"""Of a rollout: as many as can be followed while a start is dragged, and a smooth line."""
+USUAL, LEAST, MOST = 0.02, 20, 500
+"""Seconds of a step, as of `policy.rollout`, where recordings have no finer ones; and how many steps a rollout has: a
+smooth line, and what can be followed while a start is dragged."""
 
 
 @dataclass(frozen=True)
@@ -30,18 +31,24 @@ class Wanted:
     ----------
     start : ndarray of shape (n,)
         Where it starts.
-    seconds : float
-        How long it lasts.
+    steps : int
+        How many.
+    dt : float
+        Seconds of each.
     barriers : sequence of Barrier
         What is in its way, in the scene.
     under : callable, optional
         From states (S, n) to rows (S, k, d) of a constraint that holds as well.
+    anywhere : bool
+        Whether it may leave what was recorded, unless it diverges.
     """
 
     start: Array
-    seconds: float
+    steps: int
+    dt: float
     barriers: Sequence[Barrier] = ()
     under: Callable[[Array], Array] | None = None
+    anywhere: bool = False
 
 
 class Compiled:
@@ -88,7 +95,7 @@ class Follower:
     def __init__(self, policy: Policy, state_names: Sequence[str] | None = None) -> None:
         self.policy, self.state_names = policy, state_names
         self._step = None if policy.stability_ is not None else Compiled(policy)
-        self._recorded = Recorded(policy)
+        self._recorded, self._anywhere = Recorded(policy), Recorded(policy, np.inf)
 
     @property
     def is_compiled(self) -> bool:
@@ -110,11 +117,10 @@ class Follower:
         Returns
         -------
         Movement
-            Of at most `STEPS` steps; `stopped` says where it left what was recorded. `projections` are there where
-            something may be in the way.
+            Of at most the steps that are wanted; `stopped` says where it left what was recorded. `projections` are
+            there where something may be in the way.
         """
-        dt = wanted.seconds / STEPS
-        in_the_way = InTheWay(wanted.barriers, coordinates, frame, dt, self.policy.scale_)
+        in_the_way = InTheWay(wanted.barriers, coordinates, frame, wanted.dt, self.policy.scale_)
 
         def project(sample: int, X: Array, U: Array) -> Array:
             return in_the_way.projections(X, U, None if wanted.under is None else wanted.under(X))
@@ -122,18 +128,40 @@ class Follower:
         policy: Any = self.policy if self._step is None else self._step
         constrained = bool(wanted.barriers) or wanted.under is not None
         # A stabilised policy leads back by itself, but not necessarily under a constraint.
-        guards = [] if self._step is None and not constrained else [self._recorded]
+        leads_back = self._step is None and not constrained
+        guards = [] if leads_back else [self._anywhere if wanted.anywhere else self._recorded]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MovementStopped)  # which the page says
             return simulate(
                 policy,
                 wanted.start,
-                STEPS,
-                dt,
+                wanted.steps,
+                wanted.dt,
                 project=project if constrained else None,
                 guards=guards,
                 state_names=self.state_names,
             )
+
+
+def choose_steps(seconds: float, usual: float) -> tuple[int, float]:
+    """Choose the steps of a rollout.
+
+    Parameters
+    ----------
+    seconds : float
+        How long it lasts.
+    usual : float
+        Seconds between recorded samples.
+
+    Returns
+    -------
+    steps : int
+        From `LEAST` to `MOST`.
+    dt : float
+        Seconds of each: no more than the usual, and than `USUAL`, if that makes no more than `MOST`.
+    """
+    steps = int(np.clip(np.ceil(seconds / min(usual, USUAL) - 1e-6), LEAST, MOST))
+    return steps, seconds / steps
 
 
 def is_held(movement: Movement) -> NDArray[np.bool_]:

@@ -1,9 +1,13 @@
 """What the page says in words: the legend, what was guessed or left out, and how the rollout ended."""
 
+import re
+
 from unconstrain.stopping import Movement, describe_stop
 from unconstrain.viewer import palette
-from unconstrain.viewer.following import STEPS, is_held
+from unconstrain.viewer.following import USUAL, choose_steps, is_held
 from unconstrain.viewer.stage import DIRECT, Stage
+
+ANYWHERE = "May leave what was recorded"
 
 BOX = (
     '<span style="display:inline-block;width:0.9em;height:0.9em;border-radius:2px;vertical-align:-0.1em;'
@@ -41,29 +45,39 @@ def describe_colours(stage: Stage) -> str:
     return TEXT.format("".join(BOX.format(colour=colour, words=words) for colour, words in rows))
 
 
-def describe_rollout(movement: Movement) -> str:
+def describe_rollout(movement: Movement, stage: Stage) -> str:
     """Say where a rollout leads, and why it ended.
 
     Parameters
     ----------
     movement : Movement
         One.
+    stage : Stage
+        What it is a rollout of.
 
     Returns
     -------
     str
         HTML.
     """
+    steps, wanted = choose_steps(stage.seconds, stage.interval)
     dt = 0.0 if movement.time is None or len(movement) < 2 else float(movement.time[1] - movement.time[0])
     end = ", ".join(
         f"{name} {value:.4g}" for name, value in zip(movement.state_names, movement.states[-1], strict=True)
     )
     said = [f"{len(movement) - 1} steps of {dt:.3g} s; then {end}."]
+    if wanted > 1.01 * min(stage.interval, USUAL):
+        said.append(
+            "These are coarser than is usual, so that they can be followed; shorter rollouts have finer ones."
+        )
     held = is_held(movement).mean()
     if held:
         said.append(f"Something was in the way of {held:.0%} of it.")
     if movement.stopped:
-        said.append(sentence(describe_stop(movement.stopped[0], STEPS, movement.state_names)))
+        told = describe_stop(movement.stopped[0], steps, movement.state_names)
+        # What allows it is an argument elsewhere, and a checkbox here.
+        told = re.sub(r"; say with beyond=.*", f'; "{ANYWHERE}" lets it go on', told)
+        said.append(sentence(told))
     return TEXT.format(" ".join(said))
 
 

@@ -15,6 +15,7 @@ from unconstrain.policies.base import Policy
 from unconstrain.spaces import SecondOrder
 from unconstrain.viewer import samples, server
 from unconstrain.viewer.coordinates import Axes, Coordinates, Picked
+from unconstrain.viewer.following import USUAL
 from unconstrain.viewer.frame import Frame
 from unconstrain.viewer.page import Page
 from unconstrain.viewer.stage import DIRECT, LEARNT, Stage
@@ -124,6 +125,7 @@ def view(
         frame=Frame.around(seen.place(X), in_metres=robot is not None),
         start=X[0].copy(),
         seconds=_duration(shown.demos),
+        interval=_interval(demos),
         under=under,
     )
     try:
@@ -192,6 +194,15 @@ def _rows(constraint: Any, d: int) -> Callable[[Array], Array]:
             f"constraint= must be rows of {d} numbers, one for each action, got shape {trial.shape}"
         )
     return rows
+
+
+def _interval(demos: Demonstrations | None) -> float:
+    """Return the usual time between recorded samples, in seconds; that of a rollout's step where it is not known."""
+    if demos is None or demos.time is None:
+        return USUAL
+    apart = np.diff(demos.time)[demos.episodes[1:] == demos.episodes[:-1]]
+    apart = apart[apart > 0]
+    return float(np.median(apart)) if len(apart) else USUAL
 
 
 def _duration(demos: Demonstrations) -> float:

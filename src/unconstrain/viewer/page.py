@@ -14,7 +14,7 @@ from unconstrain.viewer.controls import Controls
 from unconstrain.viewer.coordinates import Picked
 from unconstrain.viewer.diagnosis import Diagnosis
 from unconstrain.viewer.field import HELD, Field
-from unconstrain.viewer.following import Follower, Wanted
+from unconstrain.viewer.following import Follower, Wanted, choose_steps
 from unconstrain.viewer.frame import Frame
 from unconstrain.viewer.movements import Movements
 from unconstrain.viewer.newest import Newest
@@ -56,7 +56,7 @@ class Page:
             name: Follower(policy, stage.shown.demos.state_names) for name, policy in stage.policies.items()
         }
         self._point: Array | None = None
-        self._is_under = stage.under is not None
+        self._is_under, self._anywhere = stage.under is not None, False
         self.movements, self.field, self.diagnosis = Movements(), Field(demos), Diagnosis(demos)
         self.surroundings, self.path = Surroundings(), Path(stage)
         self._following = Newest(self._follow, self._fail)
@@ -205,6 +205,11 @@ class Page:
         self._is_under = is_under
         self.follow()
 
+    def lead_anywhere(self, anywhere: bool) -> None:
+        """Let rollouts leave what was recorded, or stop them there."""
+        self._anywhere = anywhere
+        self.follow()
+
     def move_start(self, k: int, value: float) -> None:
         """Move the start along a number that is not shown.
 
@@ -243,9 +248,10 @@ class Page:
             stage.start = stage.coordinates.put(stage.start, stage.frame.from_scene(point))
         wanted = Wanted(
             stage.start,
-            stage.seconds,
+            *choose_steps(stage.seconds, stage.interval),
             self.obstacles.barriers(),
             stage.under if self._is_under else None,
+            self._anywhere,
         )
         stage.set_movement(self._followers[stage.name].follow(wanted, stage.coordinates, stage.frame))
 
@@ -265,7 +271,7 @@ class Page:
             self.controls.diagnosis.content = legend.describe_notes([self.diagnosis.words])
 
     def _tell_rollout(self, movement: Movement) -> None:
-        self.controls.ending.content = legend.describe_rollout(movement)
+        self.controls.ending.content = legend.describe_rollout(movement, self.stage)
 
     def _at_time(self, seconds: float, state: Array) -> None:
         self.path.mark(state)

@@ -48,6 +48,8 @@ class Stage:
         Of the rollout.
     seconds : float
         How long a rollout lasts.
+    interval : float
+        Seconds between recorded samples.
     under : callable, optional
         From states (S, n) to rows (S, k, d) of a constraint under which rollouts may be.
 
@@ -69,6 +71,7 @@ class Stage:
     frame: Frame
     start: Array
     seconds: float
+    interval: float
     under: Callable[[Array], Array] | None = None
     name: str = LEARNT
     movement: Movement | None = None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from unconstrain.features.centers import farthest_first
 from unconstrain.simulation import simulate
 from unconstrain.stopping import MovementStopped, Recorded
-from unconstrain.viewer.following import Compiled
+from unconstrain.viewer.following import Compiled, choose_steps
 from unconstrain.viewer.stage import Stage
 from unconstrain.viewer.surroundings import limits
 
@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 CELLS, DENSITY = 30, 1.1
 """Of matplotlib's grid, and how close its lines are."""
-LINES, STEPS, LASTS = 70, 30, 0.12
-"""Of rollouts instead: how many, of how many steps, and for which share of the page's rollout."""
+LINES, LASTS = 70, 0.12
+"""Of rollouts instead: how many, and for which share of the page's rollout."""
 
 
 def segments(stage: Stage) -> tuple[Array, Array]:
@@ -67,7 +67,8 @@ def _by_rollouts(stage: Stage) -> tuple[Array, Array]:
     step: Any = policy if policy.stability_ is not None else Compiled(policy)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MovementStopped)
-        movement = simulate(step, starts, STEPS, LASTS * stage.seconds / STEPS, guards=[Recorded(policy)])
+        steps, dt = choose_steps(LASTS * stage.seconds, stage.interval)
+        movement = simulate(step, starts, steps, dt, guards=[Recorded(policy)])
     P = stage.places(movement.states)
     first = np.flatnonzero(movement.episodes[1:] == movement.episodes[:-1])
     return np.stack([P[first], P[first + 1]], axis=1), movement.states[first]

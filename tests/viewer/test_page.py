@@ -169,3 +169,26 @@ def test_many_samples_are_thinned_and_it_is_said(policy, monkeypatch):
     shown = samples.choose(policy, demos)
     assert len(shown.demos) <= 50
     assert f"of {len(demos)} samples one in" in shown.notes[0]
+
+
+def test_other_coordinates_are_shown_in_a_scene_of_their_own():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, size=(200, 4)) * [1, 10, 100, 1]
+    demos = uc.Demonstrations(X, -X, np.arange(200) // 20, state_names=["a", "b", "c", "d"])
+    page = uc.view(uc.ParametricPolicy().fit(demos), demos, port=0)
+    try:
+        page.put_in_the_way(BOTH)
+        page.show_coordinates([2, 0])
+        assert page.settle()
+        assert page.stage.coordinates.names == ("c", "a")
+        assert page.stage.frame.is_flat
+        assert page.stage.frame.extent == pytest.approx(2.0)
+        held = page.stage.start.copy()
+        page.start.drag_to(np.array([0.5, 0.0, 0.0]))
+        page.move_start(1, 3.0)
+        assert page.settle()
+        assert page.stage.start[2] == pytest.approx(page.stage.frame.centre[0] + 0.5 / page.stage.frame.scale)
+        np.testing.assert_allclose(page.stage.start[[1, 3]], [3.0, held[3]])
+        assert page.notes == []
+    finally:
+        page.close()

@@ -90,14 +90,14 @@ class Obstacles:
     def barriers(self) -> list[Barrier]:
         """Return what is in the way now."""
         found: list[Barrier] = []
-        if self.chosen in (PLANE, BOTH):
-            handle = self._handles[PLANE]
+        # A handle is missing for a moment while other coordinates are shown.
+        if self.chosen in (PLANE, BOTH) and (handle := self._handles.get(PLANE)) is not None:
             found.append(Plane(np.array(handle.position), _first_axis(np.array(handle.wxyz))))
-        if self.chosen in (BOX, BOTH):
+        if self.chosen in (BOX, BOTH) and (handle := self._handles.get(BOX)) is not None:
             sides = np.full(3, self.side)
             if self._stage is not None:
                 sides[len(self._stage.coordinates.names) :] = np.inf
-            found.append(Box(np.array(self._handles[BOX].position), sides))
+            found.append(Box(np.array(handle.position), sides))
         return found
 
     def _make(self, stage: Stage, name: str) -> Any:

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import UnconstrainError
 from unconstrain.stopping import Movement
 from unconstrain.viewer import camera, exporting, legend, server
 from unconstrain.viewer.controls import Controls
@@ -176,7 +175,7 @@ class Page:
             return
         coordinates = Picked(stage.axes, which)
         self.controls.show_axes(which)
-        stage.coordinates, stage.frame = coordinates, Frame.around(coordinates.place(stage.states))
+        stage.scenery = (coordinates, Frame.around(coordinates.place(stage.states)))
         for k, slider in enumerate(self.controls.others):
             slider.visible = k not in which
         self.controls.show_side(self.obstacles.side_in_units(stage))
@@ -243,9 +242,10 @@ class Page:
 
     def _follow(self, _: None) -> None:
         stage = self.stage
+        coordinates, frame = stage.scenery
         point, self._point = self._point, None
         if point is not None:
-            stage.start = stage.coordinates.put(stage.start, stage.frame.from_scene(point))
+            stage.start = coordinates.put(stage.start, frame.from_scene(point))
         wanted = Wanted(
             stage.start,
             *choose_steps(stage.seconds, stage.interval),
@@ -253,17 +253,18 @@ class Page:
             stage.under if self._is_under else None,
             self._anywhere,
         )
-        stage.set_movement(self._followers[stage.name].follow(wanted, stage.coordinates, stage.frame))
+        stage.set_movement(self._followers[stage.name].follow(wanted, coordinates, frame))
 
     def _draw(self, _: None) -> None:
-        stage = self.stage
+        stage, scenery = self.stage, self.stage.scenery
         # What takes long comes last, and what fails stops nothing else.
         quick: tuple[Part, ...] = (self.surroundings, self.movements, self.path, self.start, self.obstacles)
         for part in (*quick, self.field, self.diagnosis):
             try:
                 part.draw(stage)
-            except UnconstrainError as error:
-                self._fail(error)
+            except Exception as error:
+                if stage.scenery is scenery:  # otherwise it is drawn anew already
+                    self._fail(error)
         why_not = self.field.sureness(stage).why_not
         if why_not:
             self.say(f"opacity is by distance from recorded states only: {why_not}")

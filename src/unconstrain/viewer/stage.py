@@ -40,10 +40,8 @@ class Stage:
         The recorded samples.
     axes : Axes
         All numbers that can be shown.
-    coordinates : Coordinates
-        Those that are.
-    frame : Frame
-        Of the scene.
+    scenery : tuple of Coordinates and Frame
+        Those that are shown, and the frame of the scene. They change together, while other threads draw.
     start : ndarray of shape (n,)
         Of the rollout.
     seconds : float
@@ -67,8 +65,7 @@ class Stage:
     policies: Mapping[str, Policy]
     shown: Shown
     axes: Axes
-    coordinates: Coordinates
-    frame: Frame
+    scenery: tuple[Coordinates, Frame]
     start: Array
     seconds: float
     interval: float
@@ -77,6 +74,16 @@ class Stage:
     movement: Movement | None = None
     updates: int = 0
     listeners: list[Callable[[Movement], None]] = field(default_factory=list)
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """What is shown of states."""
+        return self.scenery[0]
+
+    @property
+    def frame(self) -> Frame:
+        """The frame of the scene."""
+        return self.scenery[1]
 
     @property
     def policy(self) -> Policy:
@@ -90,7 +97,8 @@ class Stage:
 
     def places(self, X: Array, lift: float = 0.0) -> Array:
         """Return where states (N, n) are in the scene, (N, 3); see `Frame.to_scene`."""
-        return self.frame.to_scene(self.coordinates.place(X), lift)
+        coordinates, frame = self.scenery
+        return frame.to_scene(coordinates.place(X), lift)
 
     def set_movement(self, movement: Movement) -> None:
         """Keep a rollout, and tell all that wait for one.

@@ -1,0 +1,225 @@
+"""What a file of Rerun's holds: movements, fields, a rollout, and the numbers over time."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError
+from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, SERIES, TRUE
+
+Array = NDArray[np.float64]
+
+MOST_EPISODES, MOST_SAMPLES = 200, 200_000
+"""More recordings, and more samples, are thinned evenly: a viewer has to stay fluent."""
+
+ALONG = {1: 40, 2: 24, 3: 11}
+"""Places along each dimension of the grid on which a field is drawn."""
+
+MOST_ARROWS = 600
+"""Where states have more than three dimensions, at so many recorded ones."""
+
+USUAL, LONGEST = 0.9, 1.5
+"""The quantile of speed that is drawn one spacing long, and how many spacings the longest arrow may be."""
+
+FREE, CONSTRAINED = SERIES[2], SERIES[3]
+"""Colours of samples in whose way surely nothing was, and surely something."""
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """Where in space states are drawn.
+
+    Parameters
+    ----------
+    axes : tuple of int
+        Which states are drawn, one to three.
+    names : tuple of str
+        Of these.
+    low, high : ndarray of shape (3,)
+        The corners of the recorded states; 0 along what is missing of three dimensions.
+    notes : tuple of str
+        What is not drawn.
+    """
+
+    axes: tuple[int, ...]
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def around(cls, demos: Demonstrations, coordinates: tuple[int, ...] | None) -> "Room":
+        """Make the room of recordings, with the coordinates given or the first three."""
+        n = demos.states.shape[1]
+        axes = tuple(range(min(n, 3))) if coordinates is None else tuple(coordinates)
+        if not 1 <= len(set(axes)) == len(axes) <= 3 or not all(i in range(n) for i in axes):
+            raise DataError(
+                f"coordinates= must be one to three different states of {n}, counted from 0, not {coordinates}"
+            )
+        names = tuple(demos.state_names[i] for i in axes)
+        points = _padded(demos.states[:, axes])
+        notes = (f"Of {n} states {', '.join(names)} are drawn.",) if n > len(axes) else ()
+        return cls(axes, names, points.min(axis=0), points.max(axis=0), notes)
+
+    @property
+    def size(self) -> float:
+        """The longest side of the recorded states; 1 where they are one point."""
+        return float((self.high - self.low).max()) or 1.0
+
+    def place(self, values: Array) -> Array:
+        """Return what is drawn of states or velocities (N, n): points (N, 3)."""
+        return _padded(values[:, self.axes])
+
+
+def log_movements(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> list[str]:
+    """Log recordings: their paths coloured by contact, a point that moves along each, and their numbers over time."""
+    import rerun as rr
+
+    chance, notes = find_contact(policy, demos)
+    colors = contact_colors(chance, len(demos))
+    shown = np.arange(demos.n_episodes)
+    if len(shown) > MOST_EPISODES:
+        shown = np.linspace(0, len(shown) - 1, MOST_EPISODES).round().astype(int)
+        notes.append(f"Of {demos.n_episodes:,} recordings {MOST_EPISODES} are in the file, spread evenly.")
+    rows = [np.flatnonzero(demos.episodes == code) for code in shown]
+    every = -(-sum(map(len, rows)) // MOST_SAMPLES)
+    if every > 1:
+        notes.append(f"One sample of {every} is in the file.")
+    if demos.time is None:
+        notes.append("The recordings have no time: they are on the time line `sample` only.")
+    points = room.place(demos.states)
+    for code, own in zip(shown, rows, strict=True):
+        kept = own[::every]
+        name = rr.escape_entity_path_part(demos.episode_labels[code])
+        indexes = [rr.TimeColumn("sample", sequence=kept.tolist())]
+        if demos.time is not None:
+            indexes.append(rr.TimeColumn("time", duration=demos.time[kept]))
+        path, at = f"demonstrations/paths/{name}", f"demonstrations/now/{name}"
+        # A line has one colour: a piece from each sample to the next has that of the first.
+        pieces = np.stack([points[kept[:-1]], points[kept[1:]]], axis=1)
+        line = rr.LineStrips3D(pieces, colors=colors[kept[:-1]], radii=rr.Radius.ui_points(1.5))
+        stream.log(path, line, static=True, strict=True)
+        stream.log(at, rr.Points3D.from_fields(radii=rr.Radius.ui_points(5.0)), static=True, strict=True)
+        columns = rr.Points3D.columns(positions=points[kept], colors=colors[kept])
+        stream.send_columns(at, indexes, columns, strict=True)
+        for kind, values, names in (
+            ("states", demos.states, demos.state_names),
+            ("actions", demos.actions, demos.action_names),
+        ):
+            _log_series(stream, f"{kind}/recorded/{name}", indexes, values[kept], names)
+        if chance is not None:
+            _log_series(stream, f"contact/recorded/{name}", indexes, chance[kept, None], ["probability of free"])
+    return notes
+
+
+def log_field(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> list[str]:
+    """Log the learnt field as arrows, and ordinary regression's beside it, both to one scale."""
+    import rerun as rr
+
+    if demos.states.shape != demos.actions.shape:
+        return ["There is no field of arrows: the actions are not velocities of the states, one each."]
+    states, spacing = _field_states(demos, room)
+    fields = {"learnt": (policy, LEARNT)}
+    regression = getattr(policy, "ordinary_regression", lambda: None)()
+    notes = []
+    if regression is None:
+        notes.append("Ordinary regression's field is missing: the policy does not hold it.")
+    elif getattr(policy, "risk", None) != "direct":
+        fields["ordinary_regression"] = (regression, DIRECT)
+    vectors = {name: room.place(_predict(each, states)) for name, (each, _) in fields.items()}
+    speed = np.linalg.norm(vectors["learnt"], axis=1)
+    usual = float(np.quantile(speed, USUAL)) or 1.0
+    for name, each in vectors.items():
+        length = np.linalg.norm(each, axis=1, keepdims=True)
+        # One fast stretch shall not make all other arrows points.
+        shorter = np.minimum(1.0, LONGEST * usual / np.maximum(length, 1e-300))
+        arrows = rr.Arrows3D(
+            origins=room.place(states),
+            vectors=each * shorter * (spacing / usual),
+            colors=_rgb(fields[name][1]),
+            radii=0.06 * spacing,
+        )
+        stream.log(f"field/{name}", arrows, static=True, strict=True)
+    notes.append(
+        f"An arrow of the field {spacing:.3g} long is a speed of {usual:.3g}; none is drawn longer than "
+        f"{LONGEST:g} times that."
+    )
+    return notes
+
+
+def log_rollout(stream: Any, movement: Demonstrations, room: Room) -> None:
+    """Log a rollout: its paths, a point that moves along each, and its numbers over time."""
+    import rerun as rr
+
+    points = room.place(movement.states)
+    for code in range(movement.n_episodes):
+        own = np.flatnonzero(movement.episodes == code)
+        name = str(code)
+        path = rr.LineStrips3D([points[own]], colors=_rgb(TRUE), radii=rr.Radius.ui_points(3.0))
+        stream.log(f"rollout/paths/{name}", path, static=True, strict=True)
+        at = f"rollout/now/{name}"
+        style = rr.Points3D.from_fields(radii=rr.Radius.ui_points(8.0), colors=_rgb(TRUE))
+        stream.log(at, style, static=True, strict=True)
+        if movement.time is None:
+            continue
+        indexes = [rr.TimeColumn("time", duration=movement.time[own])]
+        stream.send_columns(at, indexes, rr.Points3D.columns(positions=points[own]), strict=True)
+        _log_series(stream, f"states/rollout/{name}", indexes, movement.states[own], movement.state_names)
+        _log_series(stream, f"actions/rollout/{name}", indexes, movement.actions[own], movement.action_names)
+
+
+def find_contact(policy: Any, demos: Demonstrations) -> tuple[Array | None, list[str]]:
+    """Find how surely each sample was free (N,): as inferred, or else as recorded; None where neither is known."""
+    if getattr(policy, "risk", None) == "adaptive":
+        return policy.free_probability(demos), []
+    if demos.free is not None:
+        return demos.free, ["Contact is coloured as recorded: the policy infers none."]
+    return None, ["Recordings have one colour: the policy infers no contact, and none was recorded."]
+
+
+def contact_colors(chance: Array | None, count: int) -> NDArray[np.uint8]:
+    """Return a colour a sample (N, 3), from that of constrained ones to that of free ones."""
+    if chance is None:
+        return np.tile(_rgb(RECORDED), (count, 1))
+    free, constrained = (_rgb(color).astype(float) for color in (FREE, CONSTRAINED))
+    return (constrained + chance[:, None] * (free - constrained)).round().astype(np.uint8)
+
+
+def _log_series(stream: Any, path: str, indexes: Any, values: Array, names: Any) -> None:
+    import rerun as rr
+
+    stream.log(path, rr.SeriesLines(names=list(names)), static=True, strict=True)
+    stream.send_columns(path, indexes, rr.Scalars.columns(scalars=values), strict=True)
+
+
+def _field_states(demos: Demonstrations, room: Room) -> tuple[Array, float]:
+    """States at which a field is drawn, and how far they are from each other: a grid near the recorded ones."""
+    from scipy.spatial import cKDTree  # slow to import
+
+    X = demos.states
+    n = X.shape[1]
+    if n > 3:
+        step = max(1, len(X) // MOST_ARROWS)
+        return X[::step], room.size / ALONG[2]
+    low, high = X.min(axis=0), X.max(axis=0)
+    places = [np.linspace(a, b, ALONG[n] if b > a else 1) for a, b in zip(low, high, strict=True)]
+    spacing = np.where(high > low, (high - low) / (ALONG[n] - 1), 1.0)
+    grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, n)
+    distance, _ = cKDTree(X / spacing).query(grid / spacing)
+    return grid[distance <= 1.0], float(spacing[high > low].min(initial=room.size))
+
+
+def _predict(policy: Any, X: Array) -> Array:
+    predict = getattr(policy, "predict", policy)
+    return np.asarray(predict(X), dtype=np.float64).reshape(len(X), -1)
+
+
+def _padded(points: Array) -> Array:
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
+def _rgb(color: str) -> NDArray[np.uint8]:
+    return np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.uint8)

@@ -1,0 +1,171 @@
+"""Recordings, the learnt field and a rollout as a file of Rerun (.rrd), for the viewer robotics people have."""
+
+import os
+import warnings
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from unconstrain import atomic
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import DataError, PolicyError, UnconstrainError
+from unconstrain.simulation import rollout as integrate
+from unconstrain.stopping import Movement, MovementStopped, describe_stop
+from unconstrain.viewer.rerun_entities import Room, log_field, log_movements, log_rollout
+from unconstrain.viewer.rerun_layout import lay_out
+
+SUFFIX = ".rrd"
+
+MOST_STEPS = 5000
+"""Of the rollout that is made where none is given."""
+
+
+def log_rerun(
+    policy: Any,
+    demos: Demonstrations,
+    path: str | os.PathLike[str],
+    *,
+    rollout: Demonstrations | None = None,
+    coordinates: tuple[int, ...] | None = None,
+    overwrite: bool = False,
+) -> tuple[str, ...]:
+    """Write recordings, the learnt field and a rollout for Rerun's viewer: ``rerun FILE.rrd`` opens it.
+
+    The time line ``time`` (seconds since each recording began) plays all recordings and the rollout at once, ``sample``
+    plays the recordings one after another. Ordinary regression's field is in the file and hidden at first.
+
+    Parameters
+    ----------
+    policy : Policy
+        A fitted policy of this library. Other objects with ``predict(X)`` have no inferred contact and no ordinary
+        regression, which the result then says.
+    demos : Demonstrations
+        What it was learnt from, or other recordings of the same states.
+    path : str or path
+        Of the file, whose name ends in ``.rrd``.
+    rollout : Demonstrations, optional
+        A movement that `policy.rollout` returned. By default the policy is followed from where the first recording
+        starts, for as long as that recording took.
+    coordinates : tuple of int, optional
+        Which of the states are drawn in space, at most three, counted from 0; by default the first three.
+    overwrite : bool
+        Whether a file that exists is replaced.
+
+    Returns
+    -------
+    tuple of str
+        What was left out, thinned or approximated, a sentence each. The file holds them as well, as ``notes``.
+
+    Raises
+    ------
+    DataError
+        The name of the file is not right, the file exists, or the coordinates are not states.
+    PolicyError
+        The policy was not learnt over states of as many dimensions.
+    UnconstrainError
+        Rerun, which comes with the extra `rerun`, is not installed, or the file cannot be written.
+
+    Examples
+    --------
+    >>> uc.viewer.log_rerun(policy, demos, "wipe.rrd")                               # doctest: +SKIP
+    ()
+    """
+    rr = import_rerun()
+    target = atomic.as_path(path)
+    if target.suffix.lower() != SUFFIX:
+        raise DataError(f"a file of Rerun's ends in {SUFFIX}: name it so, not {target.name!r}")
+    if not overwrite and target.exists():
+        raise DataError(f"{target} exists: give overwrite= to replace it, or another name")
+    known = getattr(policy, "n_features_in_", demos.states.shape[1])
+    if known != demos.states.shape[1]:
+        raise PolicyError(
+            f"the policy was learnt over {known} states and the recordings have {demos.states.shape[1]}: give the "
+            "recordings that it was learnt from, or others with the same columns"
+        )
+    room = Room.around(demos, coordinates)
+    notes = list(room.notes)
+    if rollout is None:
+        rollout, said = _follow(policy, demos)
+        notes += said
+    with atomic.replacing(target) as temporary:
+        stream = rr.RecordingStream("unconstrain", send_properties=True)
+        stream.set_log_tick_enabled(False)
+        stream.set_log_time_enabled(False)
+        stream.save(temporary)
+        stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True, strict=True)
+        notes += log_movements(stream, policy, demos, room)
+        notes += log_field(stream, policy, demos, room)
+        if rollout is not None:
+            log_rollout(stream, rollout, room)
+        lines = "\n".join(f"- {note}" for note in notes) or "- Nothing was left out."
+        text = rr.TextDocument(f"# unconstrain\n\n{lines}\n", media_type=rr.MediaType.MARKDOWN)
+        stream.log("notes", text, static=True, strict=True)
+        stream.send_blueprint(lay_out(demos, room, has_rollout=rollout is not None))
+        stream.flush()
+        stream.disconnect()
+    return tuple(notes)
+
+
+def check_rerun(path: Path, *, overwrite: bool) -> None:
+    """Raise what `log_rerun` would raise of the file and the package, before any work is done.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    overwrite : bool
+        Whether a file that exists is replaced.
+
+    Raises
+    ------
+    UnconstrainError
+        As for `log_rerun`.
+    """
+    import_rerun()
+    if path.suffix.lower() != SUFFIX:
+        raise DataError(f"a file of Rerun's ends in {SUFFIX}: name it so, not {path.name!r}")
+
+
+def import_rerun() -> ModuleType:
+    """Import the package `rerun`.
+
+    Returns
+    -------
+    module
+        The package.
+
+    Raises
+    ------
+    UnconstrainError
+        If it is not installed.
+    """
+    try:
+        import rerun
+        import rerun.blueprint
+    except ImportError as error:
+        raise UnconstrainError(
+            f"files for Rerun's viewer are written by rerun-sdk, which cannot be imported here ({error}): "
+            "pip install 'unconstrain[rerun]'"
+        ) from error
+    return rerun
+
+
+def _follow(policy: Any, demos: Demonstrations) -> tuple[Movement | None, list[str]]:
+    """Follow the policy from where the first recording starts, for as long as it took, and say what is to be said."""
+    first = demos.episode(0)
+    if first.time is None or len(first) < 2:
+        return None, ["There is no rollout: the first recording has no time, so give one with rollout=."]
+    dt = float(np.median(np.diff(first.time)))
+    steps = min(len(first) - 1, MOST_STEPS)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MovementStopped)  # which the notes say
+            movement = integrate(policy, first.states[0], steps, dt)
+    except (DataError, PolicyError) as error:
+        return None, [f"There is no rollout: {error}."]
+    label = demos.episode_labels[0]
+    said = [f"The rollout starts where recording {label} does and takes {steps} steps of {dt:g} s."]
+    said += [f"It stopped: {describe_stop(stop, steps, movement.state_names)}." for stop in movement.stopped]
+    return movement, said

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
-from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED, SERIES, TRUE
+from unconstrain.viewer import palette
 
 Array = NDArray[np.float64]
 
@@ -23,9 +23,6 @@ MOST_ARROWS = 600
 
 USUAL, LONGEST = 0.9, 1.5
 """The quantile of speed that is drawn one spacing long, and how many spacings the longest arrow may be."""
-
-FREE, CONSTRAINED = SERIES[2], SERIES[3]
-"""Colours of samples in whose way surely nothing was, and surely something."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,13 +119,13 @@ def log_field(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> li
     if demos.states.shape != demos.actions.shape:
         return ["There is no field of arrows: the actions are not velocities of the states, one each."]
     states, spacing = _field_states(demos, room)
-    fields = {"learnt": (policy, LEARNT)}
+    fields = {"learnt": (policy, palette.LEARNT)}
     regression = getattr(policy, "ordinary_regression", lambda: None)()
     notes = []
     if regression is None:
         notes.append("Ordinary regression's field is missing: the policy does not hold it.")
     elif getattr(policy, "risk", None) != "direct":
-        fields["ordinary_regression"] = (regression, DIRECT)
+        fields["ordinary_regression"] = (regression, palette.DIRECT)
     vectors = {name: room.place(_predict(each, states)) for name, (each, _) in fields.items()}
     speed = np.linalg.norm(vectors["learnt"], axis=1)
     usual = float(np.quantile(speed, USUAL)) or 1.0
@@ -139,7 +136,7 @@ def log_field(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> li
         arrows = rr.Arrows3D(
             origins=room.place(states),
             vectors=each * shorter * (spacing / usual),
-            colors=_rgb(fields[name][1]),
+            colors=palette.rgb(fields[name][1]),
             radii=0.06 * spacing,
         )
         stream.log(f"field/{name}", arrows, static=True, strict=True)
@@ -158,34 +155,31 @@ def log_rollout(stream: Any, movement: Demonstrations, room: Room) -> None:
     for code in range(movement.n_episodes):
         own = np.flatnonzero(movement.episodes == code)
         name = str(code)
-        path = rr.LineStrips3D([points[own]], colors=_rgb(TRUE), radii=rr.Radius.ui_points(3.0))
+        path = rr.LineStrips3D([points[own]], colors=palette.rgb(palette.PATH), radii=rr.Radius.ui_points(3.0))
         stream.log(f"rollout/paths/{name}", path, static=True, strict=True)
         at = f"rollout/now/{name}"
-        style = rr.Points3D.from_fields(radii=rr.Radius.ui_points(8.0), colors=_rgb(TRUE))
+        style = rr.Points3D.from_fields(radii=rr.Radius.ui_points(8.0), colors=palette.rgb(palette.PATH))
         stream.log(at, style, static=True, strict=True)
         if movement.time is None:
             continue
         indexes = [rr.TimeColumn("time", duration=movement.time[own])]
         stream.send_columns(at, indexes, rr.Points3D.columns(positions=points[own]), strict=True)
-        _log_series(stream, f"states/rollout/{name}", indexes, movement.states[own], movement.state_names)
-        _log_series(stream, f"actions/rollout/{name}", indexes, movement.actions[own], movement.action_names)
-
-
-def find_contact(policy: Any, demos: Demonstrations) -> tuple[Array | None, list[str]]:
-    """Find how surely each sample was free (N,): as inferred, or else as recorded; None where neither is known."""
-    if getattr(policy, "risk", None) == "adaptive":
-        return policy.free_probability(demos), []
-    if demos.free is not None:
-        return demos.free, ["Contact is coloured as recorded: the policy infers none."]
-    return None, ["Recordings have one colour: the policy infers no contact, and none was recorded."]
+        for kind, values, names in (
+            ("states", movement.states, movement.state_names),
+            ("actions", movement.actions, movement.action_names),
+        ):
+            _log_series(
+                stream, f"{kind}/rollout/{name}", indexes, values[own], [f"rollout {each}" for each in names]
+            )
 
 
 def contact_colors(chance: Array | None, count: int) -> NDArray[np.uint8]:
     """Return a colour a sample (N, 3), from that of constrained ones to that of free ones."""
-    if chance is None:
-        return np.tile(_rgb(RECORDED), (count, 1))
-    free, constrained = (_rgb(color).astype(float) for color in (FREE, CONSTRAINED))
-    return (constrained + chance[:, None] * (free - constrained)).round().astype(np.uint8)
+    colors = np.tile(np.array(palette.rgb(palette.RECORDED), dtype=np.uint8), (count, 1))
+    if chance is not None:
+        known = ~np.isnan(chance)
+        colors[known] = palette.blend(chance[known], palette.CONSTRAINED, palette.FREE)
+    return colors
 
 
 def _log_series(stream: Any, path: str, indexes: Any, values: Array, names: Any) -> None:
@@ -219,7 +213,3 @@ def _predict(policy: Any, X: Array) -> Array:
 
 def _padded(points: Array) -> Array:
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
-
-
-def _rgb(color: str) -> NDArray[np.uint8]:
-    return np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.uint8)

@@ -1,0 +1,138 @@
+"""The rollout from a start, by the compiled step."""
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.constraints.nullspace import projection
+from unconstrain.errors import PolicyError
+from unconstrain.policies.base import Policy
+from unconstrain.simulation import simulate
+from unconstrain.stopping import Movement, MovementStopped, Recorded
+from unconstrain.viewer.barriers import Barrier, InTheWay
+from unconstrain.viewer.coordinates import Coordinates
+from unconstrain.viewer.frame import Frame
+
+Array = NDArray[np.float64]
+
+STEPS = 200
+"""Of a rollout: as many as can be followed while a start is dragged, and a smooth line."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A rollout that is wanted.
+
+    Parameters
+    ----------
+    start : ndarray of shape (n,)
+        Where it starts.
+    seconds : float
+        How long it lasts.
+    barriers : sequence of Barrier
+        What is in its way, in the scene.
+    under : callable, optional
+        From states (S, n) to rows (S, k, d) of a constraint that holds as well.
+    """
+
+    start: Array
+    seconds: float
+    barriers: Sequence[Barrier] = ()
+    under: Callable[[Array], Array] | None = None
+
+
+class Compiled:
+    """A policy whose actions are those of its compiled step, as `simulate` takes policies.
+
+    A stabilised policy stays as it is, since it has to know constraints and steps; so does one that cannot be compiled.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self.n_features_in_, self.space_, self.scale_ = policy.n_features_in_, policy.space_, policy.scale_
+        names = getattr(policy, "state_names_", None)
+        if names is not None:
+            self.state_names_ = names
+        self._predict: Callable[..., Any] = policy.predict
+        self.is_compiled = False
+        try:
+            self._predict = policy.compile()
+            self.is_compiled = True
+        except PolicyError:
+            pass
+
+    def predict(self, X: Array) -> Array:
+        """Predict actions (S, d) at states (S, n)."""
+        # One state at a time is what a compiled step is fast for.
+        return self._predict(X[0])[None] if self.is_compiled and len(X) == 1 else self._predict(X)
+
+
+class Follower:
+    """Follows a policy from starts, among barriers.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+        self._step = None if policy.stability_ is not None else Compiled(policy)
+        self._recorded = Recorded(policy)
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the compiled step is followed."""
+        return self._step is not None and self._step.is_compiled
+
+    def follow(self, wanted: Wanted, coordinates: Coordinates, frame: Frame) -> Movement:
+        """Roll the policy out.
+
+        Parameters
+        ----------
+        wanted : Wanted
+            From where, for how long, and what is in the way.
+        coordinates : Coordinates
+            In which barriers lie.
+        frame : Frame
+            Of the scene.
+
+        Returns
+        -------
+        Movement
+            Of at most `STEPS` steps; `stopped` says where it left what was recorded. `projections` are there where
+            something may be in the way.
+        """
+        dt = wanted.seconds / STEPS
+        in_the_way = InTheWay(wanted.barriers, coordinates, frame, dt, self.policy.scale_)
+
+        def project(sample: int, X: Array, U: Array) -> Array:
+            known = None if wanted.under is None else wanted.under(X)
+            return projection(in_the_way.rows(X, U, known))
+
+        policy: Any = self.policy if self._step is None else self._step
+        constrained = bool(wanted.barriers) or wanted.under is not None
+        # A stabilised policy leads back by itself, but not necessarily under a constraint.
+        guards = [] if self._step is None and not constrained else [self._recorded]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MovementStopped)  # which the page says
+            return simulate(
+                policy, wanted.start, STEPS, dt, project=project if constrained else None, guards=guards
+            )
+
+
+def is_held(movement: Movement) -> NDArray[np.bool_]:
+    """Say which samples (N,) of a rollout something was in the way of."""
+    N = movement.projections
+    if N is None:
+        return np.zeros(len(movement), dtype=bool)
+    return np.asarray(np.einsum("njj->n", N) < N.shape[-1] - 0.5)

@@ -1,0 +1,140 @@
+"""A plane to place and tilt, and a box to move, in the way of the rollout."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.viewer import palette
+from unconstrain.viewer.barriers import Barrier, Box, Plane
+from unconstrain.viewer.stage import Stage
+
+Array = NDArray[np.float64]
+
+NOTHING, PLANE, BOX, BOTH = "nothing", "a plane", "a box", "a plane and a box"
+SHEET, THIN = 0.9, 0.008
+"""Side and thickness of the plane that is drawn, as shares of the scene's extent."""
+BEGINS = 0.22
+"""Side of the box at first, as a share of the scene's extent."""
+HANDLE = 0.18
+
+
+class Obstacles:
+    """The barriers of the rollout, with their handles.
+
+    Parameters
+    ----------
+    changed : callable
+        Is called when one is moved, chosen or left away.
+    """
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self._changed = changed
+        self._handles: dict[str, Any] = {}
+        self._body: Any = None
+        self._stage: Stage | None = None
+        self.chosen = NOTHING
+        self.sides = np.ones(3)
+
+    def draw(self, stage: Stage) -> None:
+        """Draw those that are chosen, anew if what is shown changed; see `Part`."""
+        if self._stage is not stage or self._of_frame is not stage.frame:
+            self.sides = np.full(3, BEGINS * stage.frame.extent)
+            for handle in self._handles.values():
+                handle.remove()
+            self._handles, self._stage, self._of_frame = {}, stage, stage.frame
+        wanted = {PLANE: [PLANE], BOX: [BOX], BOTH: [PLANE, BOX]}.get(self.chosen, [])
+        for name in (PLANE, BOX):
+            if name in wanted and name not in self._handles:
+                self._handles[name] = self._make(stage, name)
+            if name in self._handles:
+                self._handles[name].visible = name in wanted
+
+    def choose(self, chosen: str, stage: Stage) -> None:
+        """Put one, both or neither in the way.
+
+        Parameters
+        ----------
+        chosen : str
+            `NOTHING`, `PLANE`, `BOX` or `BOTH`.
+        stage : Stage
+            Where they are drawn.
+        """
+        self.chosen = chosen
+        self.draw(stage)
+        self._changed()
+
+    def resize(self, sides: Array) -> None:
+        """Make the box of other sides (3,), in the scene."""
+        self.sides = sides
+        if self._body is not None and self._stage is not None:
+            self._body.dimensions = self._drawn_sides(self._stage)
+        self._changed()
+
+    def place(self, name: str, point: Array, wxyz: Array | None = None) -> None:
+        """Put a plane or a box to a point (3,) of the scene, and turn it, as if its handle were dragged."""
+        self._handles[name].position = tuple(point)
+        if wxyz is not None:
+            self._handles[name].wxyz = tuple(wxyz)
+        self._changed()
+
+    def barriers(self) -> list[Barrier]:
+        """Return what is in the way now."""
+        found: list[Barrier] = []
+        if self.chosen in (PLANE, BOTH):
+            handle = self._handles[PLANE]
+            found.append(Plane(np.array(handle.position), _first_axis(np.array(handle.wxyz))))
+        if self.chosen in (BOX, BOTH):
+            sides = self.sides.copy()
+            if self._stage is not None:
+                sides[len(self._stage.coordinates.names) :] = np.inf
+            found.append(Box(np.array(self._handles[BOX].position), sides))
+        return found
+
+    def _make(self, stage: Stage, name: str) -> Any:
+        scene, frame, extent = stage.server.scene, stage.frame, stage.frame.extent
+        # The plane begins on the far side of where the rollout starts, facing it.
+        begin = stage.places(stage.start[None])[0]
+        at = begin + 0.6 * (frame.middle - begin)
+        at = at + np.array([0.15 * extent, 0.0, 0.0]) if np.allclose(at, begin, atol=0.05 * extent) else at
+        handle = scene.add_transform_controls(
+            f"/{'plane' if name == PLANE else 'box'}",
+            scale=HANDLE * extent,
+            active_axes=(True, True, not frame.is_flat),
+            disable_rotations=name == BOX,
+            depth_test=False,
+            position=tuple(at),
+            wxyz=_facing(begin - at) if name == PLANE else (1.0, 0.0, 0.0, 0.0),
+        )
+        style = dict(color=palette.rgb(palette.HELD), opacity=0.35, cast_shadow=False, receive_shadow=False)
+        if name == PLANE:
+            high = 0.04 * extent if frame.is_flat else SHEET * extent
+            sheet = (THIN * extent, SHEET * extent, high)
+            # What is drawn lies behind the surface that bars the way.
+            scene.add_box("/plane/sheet", dimensions=sheet, position=(-THIN * extent / 2, 0.0, 0.0), **style)
+        else:
+            self._body = scene.add_box("/box/body", dimensions=self._drawn_sides(stage), **style)
+
+        async def moved(event: Any) -> None:
+            self._changed()
+
+        handle.on_update(moved)
+        return handle
+
+    def _drawn_sides(self, stage: Stage) -> tuple[float, float, float]:
+        x, y, z = self.sides.tolist()
+        return x, y, 0.04 * stage.frame.extent if stage.frame.is_flat else z
+
+
+def _first_axis(wxyz: Array) -> Array:
+    """Return where a rotation turns the x axis to."""
+    w, x, y, z = wxyz
+    return np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
+
+
+def _facing(direction: Array) -> tuple[float, float, float, float]:
+    from unconstrain.viewer.arrows import turns
+
+    w, x, y, z = turns(direction[None])[0].tolist()
+    return w, x, y, z

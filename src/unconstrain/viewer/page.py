@@ -1,0 +1,287 @@
+"""The page and its life."""
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.stopping import Movement
+from unconstrain.viewer import exporting, legend
+from unconstrain.viewer.controls import Controls
+from unconstrain.viewer.coordinates import Picked
+from unconstrain.viewer.diagnosis import Diagnosis
+from unconstrain.viewer.field import HELD, Field
+from unconstrain.viewer.following import Follower, Wanted
+from unconstrain.viewer.frame import Frame
+from unconstrain.viewer.movements import Movements
+from unconstrain.viewer.newest import Newest
+from unconstrain.viewer.obstacles import BOTH, BOX, Obstacles
+from unconstrain.viewer.path import Path
+from unconstrain.viewer.stage import Stage
+from unconstrain.viewer.start import Start
+from unconstrain.viewer.surroundings import Surroundings
+from unconstrain.viewer.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+
+class Page:
+    """A page in the browser, as `view` returns it.
+
+    Parameters
+    ----------
+    stage : Stage
+        What is shown.
+    demos : Demonstrations, optional
+        All recordings, also those that are not shown.
+    notes : list of str
+        What was guessed or left out, a sentence each.
+
+    Attributes
+    ----------
+    url : str
+        Where it is.
+    stage : Stage
+        What is shown now: coordinates, frame of the scene, start, and the newest rollout as `movement`.
+    """
+
+    def __init__(self, stage: Stage, demos: Demonstrations | None, notes: list[str]) -> None:
+        self.stage, self.notes = stage, notes
+        self._closed = threading.Event()
+        self._state_listeners: list[Callable[[Array], None]] = []
+        self._followers = {name: Follower(policy) for name, policy in stage.policies.items()}
+        self._point: Array | None = None
+        self._is_under = stage.under is not None
+        self.movements, self.field, self.diagnosis = Movements(), Field(), Diagnosis(demos)
+        self.surroundings, self.path = Surroundings(), Path(stage)
+        self._following = Newest(self._follow, self._fail)
+        self._drawing = Newest(self._draw, self._fail)
+        self.obstacles = Obstacles(self.follow)
+        self.start = Start(stage, self.drag)
+        self.timeline = Timeline(self._at_time)
+        self.controls = Controls(self)
+        stage.listeners += [self.path.update, self._tell_rollout, self.timeline.set_movement]
+        self._look(stage)
+        self.redraw()
+        self.follow()
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        host, port = self.stage.server.get_host(), self.stage.server.get_port()
+        return f"http://{'localhost' if host in ('127.0.0.1', '0.0.0.0') else host}:{port}"
+
+    def wait(self) -> None:
+        """Serve the page until it is closed, or Ctrl-C is pressed, which closes it."""
+        try:
+            while not self._closed.wait(0.5):
+                pass
+        except KeyboardInterrupt:
+            self.close()
+
+    def close(self) -> None:
+        """End the server and all threads."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        self.timeline.close()
+        self._following.close()
+        self._drawing.close()
+        self.stage.server.stop()
+
+    def settle(self, timeout: float = 30.0) -> bool:
+        """Wait until all that was asked for is drawn.
+
+        Parameters
+        ----------
+        timeout : float
+            Seconds.
+
+        Returns
+        -------
+        bool
+            False after the timeout.
+        """
+        return self._drawing.settle(timeout) and self._following.settle(timeout)
+
+    def on_state(self, listener: Callable[[Array], None]) -> None:
+        """Call a function with the state (n,) at the time of the time line, whenever that changes.
+
+        Parameters
+        ----------
+        listener : callable
+            It may draw what has this state, a robot for example, on `page.stage.server.scene`.
+        """
+        self._state_listeners.append(listener)
+        self.timeline.go_to(self.timeline.time)
+
+    def drag(self, point: Array) -> None:
+        """Put the start to a point (3,) of the scene; the rollout follows."""
+        self._point = point
+        self._following.give(None)
+
+    def follow(self) -> None:
+        """Roll out anew."""
+        self._following.give(None)
+
+    def redraw(self) -> None:
+        """Draw everything anew, in the background."""
+        self._drawing.give(None)
+
+    def show_policy(self, name: str) -> None:
+        """Show another of the policies, by name."""
+        self.stage.name = name
+        self.controls.colours.content = legend.describe_colours(self.stage)
+        self.redraw()
+        self.follow()
+
+    def show_field(self, arrows: bool, streams: bool) -> None:
+        """Show the field as arrows, stream lines, both or not at all."""
+        self.field.shows_arrows, self.field.shows_streams = arrows, streams
+        self.redraw()
+
+    def show_through(self, through: str) -> None:
+        """Say where the arrows stand that are over more states than are shown."""
+        self.field.through = through
+        self.redraw()
+
+    def show_diagnosis(self, visible: bool) -> None:
+        """Show what is not determined, which is computed the first time."""
+        self.diagnosis.visible = visible
+        self.controls.diagnosis.visible = visible
+        self.controls.diagnosis.content = legend.describe_notes(
+            [self.diagnosis.words or "computing what the recordings determine"]
+        )
+        self.redraw()
+
+    def show_coordinates(self, which: list[int]) -> None:
+        """Show other numbers of the states, counted from 0.
+
+        Parameters
+        ----------
+        which : list of int
+            Two or three.
+        """
+        stage = self.stage
+        coordinates = Picked(stage.axes, which)
+        stage.coordinates, stage.frame = coordinates, Frame.around(coordinates.place(stage.states))
+        for k, slider in enumerate(self.controls.others):
+            slider.visible = k not in which
+        self.controls.sides.value = tuple(self.obstacle_sides())
+        self._look(stage)
+        self.redraw()
+        self.follow()
+
+    def set_seconds(self, seconds: float) -> None:
+        """Say how long rollouts last."""
+        self.stage.seconds = max(float(seconds), 1e-3)
+        self.follow()
+
+    def put_in_the_way(self, chosen: str) -> None:
+        """Put a plane, a box, both or nothing in the way of the rollout."""
+        self.controls.sides.visible = chosen in (BOX, BOTH)
+        self.obstacles.choose(chosen, self.stage)
+
+    def obstacle_sides(self) -> Array:
+        """Return the sides (3,) of the box in the units of what is shown."""
+        self.obstacles.draw(self.stage)
+        return np.round(self.obstacles.sides / self.stage.frame.scale, 6)
+
+    def resize_box(self, sides: Array) -> None:
+        """Make the box of other sides (3,), in the units of what is shown."""
+        self.obstacles.resize(np.maximum(sides, 0.0) * self.stage.frame.scale)
+
+    def follow_under(self, is_under: bool) -> None:
+        """Follow the policy under the constraint that was given, or freely."""
+        self._is_under = is_under
+        self.follow()
+
+    def move_start(self, k: int, value: float) -> None:
+        """Move the start along a number that is not shown.
+
+        Parameters
+        ----------
+        k : int
+            Which, counted from 0.
+        value : float
+            To where.
+        """
+        stage = self.stage
+        values = stage.axes.values(stage.start[None])[0]
+        values[k] = value
+        stage.start = stage.axes.state(stage.start, values)
+        self.follow()
+        if self.field.through == HELD:
+            self.redraw()
+
+    def control_time(self, what: str) -> None:
+        """Let the time line "play", "pause", or go "to start"."""
+        if what == "play":
+            self.timeline.play()
+        else:
+            self.timeline.pause()
+            if what == "to start":
+                self.timeline.go_to(0.0)
+
+    def set_speed(self, speed: float) -> None:
+        """Say how many seconds of the rollout pass in one."""
+        self.timeline.speed = speed
+
+    def draw_svg(self) -> bytes:
+        """Draw the picture as SVG, with matplotlib."""
+        return exporting.svg(self.stage, self.field.sureness(self.stage))
+
+    def _follow(self, _: None) -> None:
+        stage = self.stage
+        point, self._point = self._point, None
+        if point is not None:
+            stage.start = stage.coordinates.put(stage.start, stage.frame.from_scene(point))
+        wanted = Wanted(
+            stage.start,
+            stage.seconds,
+            self.obstacles.barriers(),
+            stage.under if self._is_under else None,
+        )
+        stage.set_movement(self._followers[stage.name].follow(wanted, stage.coordinates, stage.frame))
+
+    def _draw(self, _: None) -> None:
+        stage = self.stage
+        for part in (self.surroundings, self.movements, self.field, self.path, self.start, self.obstacles):
+            part.draw(stage)
+        self.diagnosis.draw(stage)
+        if self.diagnosis.visible:
+            self.controls.diagnosis.content = legend.describe_notes([self.diagnosis.words])
+
+    def _tell_rollout(self, movement: Movement) -> None:
+        self.controls.ending.content = legend.describe_rollout(movement)
+
+    def _at_time(self, seconds: float, state: Array) -> None:
+        self.path.mark(state)
+        self.controls.time.value = min(seconds, self.controls.time.max)
+        for listener in self._state_listeners:
+            listener(state)
+
+    def _fail(self, error: Exception) -> None:
+        self.controls.notes.visible = True
+        self.controls.notes.content = legend.describe_notes([*self.notes, str(error)])
+
+    def _look(self, stage: Stage) -> None:
+        """Put the camera where all of the scene is seen, from above what is flat."""
+        server, frame = stage.server, stage.frame
+        middle, reach = frame.middle, frame.extent
+        flat = frame.is_flat
+        server.scene.set_up_direction("+y" if flat else "+z")
+        away = np.array([0.0, 0.0, 1.95]) if flat else np.array([1.0, -1.35, 0.85])
+        aside = np.array([0.22, 0.0, 0.0]) if flat else np.array([0.12, 0.09, 0.0])
+        camera: Any = server.initial_camera
+        camera.fov = 0.7
+        camera.up = (0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0)
+        camera.look_at = tuple(middle + reach * aside)
+        camera.position = tuple(middle + reach * (aside + away))
+        for client in server.get_clients().values():
+            client.camera.up_direction = camera.up
+            client.camera.position = camera.position
+            client.camera.look_at = camera.look_at

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
+from unconstrain.policies.base import Policy
 from unconstrain.viewer import palette
+from unconstrain.viewer.samples import judge
 
 Array = NDArray[np.float64]
 
@@ -71,11 +73,12 @@ class Room:
         return _padded(values[:, self.axes])
 
 
-def log_movements(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> list[str]:
+def log_movements(stream: Any, policy: Policy, demos: Demonstrations, room: Room) -> list[str]:
     """Log recordings: their paths coloured by contact, a point that moves along each, and their numbers over time."""
     import rerun as rr
 
-    chance, notes = find_contact(policy, demos)
+    chance, source = judge(policy, demos)
+    notes = [f"Contact is {source}."]
     colors = contact_colors(chance, len(demos))
     shown = np.arange(demos.n_episodes)
     if len(shown) > MOST_EPISODES:
@@ -112,7 +115,7 @@ def log_movements(stream: Any, policy: Any, demos: Demonstrations, room: Room) -
     return notes
 
 
-def log_field(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> list[str]:
+def log_field(stream: Any, policy: Policy, demos: Demonstrations, room: Room) -> list[str]:
     """Log the learnt field as arrows, and ordinary regression's beside it, both to one scale."""
     import rerun as rr
 
@@ -120,13 +123,14 @@ def log_field(stream: Any, policy: Any, demos: Demonstrations, room: Room) -> li
         return ["There is no field of arrows: the actions are not velocities of the states, one each."]
     states, spacing = _field_states(demos, room)
     fields = {"learnt": (policy, palette.LEARNT)}
-    regression = getattr(policy, "ordinary_regression", lambda: None)()
-    notes = []
-    if regression is None:
+    regression, notes = policy.ordinary_regression(), []
+    if policy.risk == "direct":
+        notes.append("The policy is ordinary regression itself.")
+    elif regression is None:
         notes.append("Ordinary regression's field is missing: the policy does not hold it.")
-    elif getattr(policy, "risk", None) != "direct":
+    else:
         fields["ordinary_regression"] = (regression, palette.DIRECT)
-    vectors = {name: room.place(_predict(each, states)) for name, (each, _) in fields.items()}
+    vectors = {name: room.place(each.predict(states).reshape(len(states), -1)) for name, (each, _) in fields.items()}
     speed = np.linalg.norm(vectors["learnt"], axis=1)
     usual = float(np.quantile(speed, USUAL)) or 1.0
     for name, each in vectors.items():
@@ -204,11 +208,6 @@ def _field_states(demos: Demonstrations, room: Room) -> tuple[Array, float]:
     grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, n)
     distance, _ = cKDTree(X / spacing).query(grid / spacing)
     return grid[distance <= 1.0], float(spacing[high > low].min(initial=room.size))
-
-
-def _predict(policy: Any, X: Array) -> Array:
-    predict = getattr(policy, "predict", policy)
-    return np.asarray(predict(X), dtype=np.float64).reshape(len(X), -1)
 
 
 def _padded(points: Array) -> Array:

@@ -4,13 +4,14 @@ import os
 import warnings
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
+from sklearn.utils.validation import check_is_fitted
 
 from unconstrain import atomic
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError, PolicyError, UnconstrainError
+from unconstrain.policies.base import Policy
 from unconstrain.simulation import rollout as integrate
 from unconstrain.stopping import Movement, MovementStopped, describe_stop
 from unconstrain.viewer.rerun_entities import Room, log_field, log_movements, log_rollout
@@ -23,7 +24,7 @@ MOST_STEPS = 5000
 
 
 def log_rerun(
-    policy: Any,
+    policy: Policy,
     demos: Demonstrations,
     path: str | os.PathLike[str],
     *,
@@ -39,8 +40,7 @@ def log_rerun(
     Parameters
     ----------
     policy : Policy
-        A fitted policy of this library. Other objects with ``predict(X)`` have no inferred contact and no ordinary
-        regression, which the result then says.
+        Fitted.
     demos : Demonstrations
         What it was learnt from, or other recordings of the same states.
     path : str or path
@@ -61,9 +61,10 @@ def log_rerun(
     Raises
     ------
     DataError
-        The name of the file is not right, the file exists, or the coordinates are not states.
+        The name of the file is not right, the file exists, the coordinates are not states, or the recordings do not go
+        with the policy.
     PolicyError
-        The policy was not learnt over states of as many dimensions.
+        It is no policy of this library.
     UnconstrainError
         Rerun, which comes with the extra `rerun`, is not installed, or the file cannot be written.
 
@@ -74,15 +75,17 @@ def log_rerun(
     """
     rr = import_rerun()
     target = atomic.as_path(path)
-    if target.suffix.lower() != SUFFIX:
-        raise DataError(f"a file of Rerun's ends in {SUFFIX}: name it so, not {target.name!r}")
+    check_suffix(target)
     if not overwrite and target.exists():
         raise DataError(f"{target} exists: give overwrite= to replace it, or another name")
-    known = getattr(policy, "n_features_in_", demos.states.shape[1])
-    if known != demos.states.shape[1]:
-        raise PolicyError(
-            f"the policy was learnt over {known} states and the recordings have {demos.states.shape[1]}: give the "
-            "recordings that it was learnt from, or others with the same columns"
+    if not isinstance(policy, Policy):
+        raise PolicyError(f"log_rerun writes a policy of unconstrain, got {type(policy).__name__}")
+    check_is_fitted(policy)
+    wanted, given = (policy.n_features_in_, policy.n_actions_), (demos.states.shape[1], demos.actions.shape[1])
+    if wanted != given:
+        raise DataError(
+            f"these recordings have {given[0]} states and {given[1]} actions, and the policy {wanted[0]} and {wanted[1]}: "
+            "give those it was learnt from, or others like them"
         )
     room = Room.around(demos, coordinates)
     notes = list(room.notes)
@@ -108,22 +111,8 @@ def log_rerun(
     return tuple(notes)
 
 
-def check_rerun(path: Path, *, overwrite: bool) -> None:
-    """Raise what `log_rerun` would raise of the file and the package, before any work is done.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    overwrite : bool
-        Whether a file that exists is replaced.
-
-    Raises
-    ------
-    UnconstrainError
-        As for `log_rerun`.
-    """
-    import_rerun()
+def check_suffix(path: Path) -> None:
+    """Raise `DataError` for a file whose name does not end as Rerun's do."""
     if path.suffix.lower() != SUFFIX:
         raise DataError(f"a file of Rerun's ends in {SUFFIX}: name it so, not {path.name!r}")
 
@@ -152,7 +141,7 @@ def import_rerun() -> ModuleType:
     return rerun
 
 
-def _follow(policy: Any, demos: Demonstrations) -> tuple[Movement | None, list[str]]:
+def _follow(policy: Policy, demos: Demonstrations) -> tuple[Movement | None, list[str]]:
     """Follow the policy from where the first recording starts, for as long as it took, and say what is to be said."""
     first = demos.episode(0)
     if first.time is None or len(first) < 2:

@@ -38,7 +38,7 @@ class RobotScene:
     Attributes
     ----------
     notes : tuple of str
-        What cannot be drawn, a sentence each. Textures are not; a shape with one has its material's colour.
+        What cannot be drawn, a sentence each. Instead of a texture its mean colour is drawn.
     bodies : dict of int to viser.FrameHandle
         The node of each body that has a shape, by the body's number.
 

@@ -10,6 +10,8 @@ from unconstrain.robots import import_mujoco
 
 Array = NDArray[np.float64]
 
+Color = tuple[float, float, float, float]
+
 SHOWN_GROUPS = 3
 """Geoms of groups below this one are shown, as MuJoCo's own viewers do at first."""
 
@@ -41,7 +43,7 @@ class Shape:
 
     vertices: Array
     faces: NDArray[np.int64]
-    rgba: tuple[float, float, float, float]
+    rgba: Color
     is_flat: bool
 
 
@@ -50,8 +52,8 @@ def collect_shapes(
 ) -> tuple[dict[int, list[Shape]], tuple[str, ...]]:
     """Collect the shapes of each body: geoms of one colour are one shape.
 
-    Where a body has shapes made for the eye beside others that collide, as most URDF files have, only the former are
-    taken.
+    Where a body has shapes made for the eye beside others that collide in another group, as bodies from URDF files have,
+    only the former are taken.
 
     Parameters
     ----------
@@ -73,9 +75,8 @@ def collect_shapes(
         first = int(model.body_geomadr[body])
         geoms = [geom for geom in range(first, first + int(model.body_geomnum[body])) if _is_shown(model, geom)]
         geoms = [geom for geom in geoms if model.geom(geom).name not in leave_out]
-        see_only = [geom for geom in geoms if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
         merged: dict[tuple[Any, bool], list[tuple[Array, NDArray[np.int64]]]] = {}
-        for geom in see_only or geoms:
+        for geom in _for_the_eye(model, geoms):
             made = _triangulate(model, geom)
             if made is None:
                 missed.append(model.geom(geom).name or f"geom {geom}")
@@ -95,9 +96,25 @@ def _is_shown(model: Any, geom: int) -> bool:
     return model.geom_group[geom] < SHOWN_GROUPS and _find_color(model, geom)[3] > 0
 
 
-def _find_color(model: Any, geom: int) -> tuple[float, float, float, float]:
+def _for_the_eye(model: Any, geoms: list[int]) -> list[int]:
+    see_only = [geom for geom in geoms if not (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+    groups = {int(model.geom_group[geom]) for geom in see_only}
+    apart = all(model.geom_group[geom] not in groups for geom in geoms if geom not in see_only)
+    return see_only if see_only and apart else geoms
+
+
+def _find_color(model: Any, geom: int) -> Color:
     own, material = tuple(model.geom_rgba[geom].tolist()), int(model.geom_matid[geom])
-    return tuple(model.mat_rgba[material].tolist()) if material >= 0 and own == PLAIN else own
+    if material < 0 or own != PLAIN:
+        return own
+    color = model.mat_rgba[material].copy()
+    texture = int(model.mat_texid[material, import_mujoco().mjtTextureRole.mjTEXROLE_RGB])
+    if texture >= 0:
+        channels, pixels = int(model.tex_nchannel[texture]), int(model.tex_height[texture] * model.tex_width[texture])
+        start = int(model.tex_adr[texture])
+        image = model.tex_data[start : start + pixels * channels].reshape(pixels, channels)
+        color[:3] *= np.resize(image.mean(axis=0), 3) / 255.0
+    return tuple(color.tolist())
 
 
 def _triangulate(model: Any, geom: int) -> tuple[Array, NDArray[np.int64], bool] | None:

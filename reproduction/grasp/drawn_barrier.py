@@ -33,7 +33,9 @@ class DrawnBarrier:
     def __init__(self, server: Any, interaction: Interaction, change: Callable[..., None]) -> None:
         self._server, self._interaction, self._change = server, interaction, change
         self.boxes = [
-            server.scene.add_box(f"/barrier/{i}", COLOR, opacity=OPACITY, cast_shadow=False, receive_shadow=False)
+            server.scene.add_box(
+                f"/barrier/{i}", COLOR, opacity=OPACITY, cast_shadow=False, receive_shadow=False
+            )
             for i in range(BOXES)
         ]
         self.handles = {
@@ -68,7 +70,11 @@ class DrawnBarrier:
 
     def show(self) -> None:
         """Show the barrier as it stands now."""
-        way, obstacle, scene = self._interaction.in_the_way, self._interaction.obstacle, self._interaction.scene
+        way, obstacle, scene = (
+            self._interaction.in_the_way,
+            self._interaction.obstacle,
+            self._interaction.scene,
+        )
         with self._server.atomic():
             for i, box in enumerate(self.boxes):
                 box.visible = False
@@ -76,7 +82,11 @@ class DrawnBarrier:
                     continue
                 low, high = obstacle.low[0, i], obstacle.high[0, i]
                 if (high > low).all():
-                    box.position, box.dimensions, box.visible = tuple((low + high) / 2), tuple(high - low), True
+                    box.position, box.dimensions, box.visible = (
+                        tuple((low + high) / 2),
+                        tuple(high - low),
+                        True,
+                    )
             x, top = scene.origin[0] + scene.barrier_x, scene.table_top + scene.height
             places = {"aside": (way.aside, ABOVE), "width": (way.aside + way.width / 2, -ABOVE)}
             for name, (y, above) in places.items():

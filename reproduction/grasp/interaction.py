@@ -58,6 +58,11 @@ class Interaction:
     random_state : int, Generator or None
         For the postures that `restart` draws.
 
+    Raises
+    ------
+    PolicyError
+        A policy is not over six states.
+
     Attributes
     ----------
     in_the_way : InTheWay
@@ -79,6 +84,13 @@ class Interaction:
         random_state: int | np.random.Generator | None = 0,
     ):
         self.demonstrator = demonstrator
+        for name, policy in policies.items():
+            known = getattr(policy, "n_features_in_", 6)
+            if known != 6:
+                raise PolicyError(
+                    f"{name} was learnt over {known} states, and the grasp is led by a policy over six, the positions "
+                    "of both hands: give one that was learnt from such"
+                )
         self.policies = {name: _compile(policy) for name, policy in policies.items()}
         self.policy = next(iter(self.policies))
         self.model = stage(demonstrator)

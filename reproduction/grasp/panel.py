@@ -12,7 +12,10 @@ if TYPE_CHECKING:
 WIDEST, FARTHEST = 0.6, 0.25
 """Of the sliders, in metres."""
 
-LEARNT_FROM = "Learnt from gaps in the middle, 5 to 45 cm wide as a rule."
+KNOWN = {
+    GAP: "Learnt from gaps in the middle, 5 to 45 cm wide as a rule.",
+    NOTHING: "Nothing is in the way.",
+}
 NEVER = "The policy never met this: {}."
 REASONS = {GAP: "the gap is moved aside", MIDDLE: "a barrier that has to be reached around"}
 
@@ -40,7 +43,9 @@ class Panel:
             (palette.LEARNT, "where they will go, if the body can follow"),
             (palette.HELD, "where the barrier will hold them"),
         ]
-        gui.add_html(legend.TEXT.format("".join(legend.BOX.format(colour=c, words=words) for c, words in rows)))
+        gui.add_html(
+            legend.TEXT.format("".join(legend.BOX.format(colour=c, words=words) for c, words in rows))
+        )
         with gui.add_folder("In the way"):
             self.kind = gui.add_dropdown("What", (GAP, MIDDLE, NOTHING), initial_value=way.kind)
             self.width = gui.add_slider("Width (m)", 0.0, WIDEST, 0.01, way.width)
@@ -72,7 +77,7 @@ class Panel:
             slider.value = min(max(round(value, 3), slider.min), slider.max)
             slider.disabled = way.kind == NOTHING
         never = way.kind == MIDDLE or (way.kind == GAP and abs(way.aside) > ASIDE)
-        said = NEVER.format(REASONS[way.kind]) if never else LEARNT_FROM if way.kind == GAP else "Nothing is in the way."
+        said = NEVER.format(REASONS[way.kind]) if never else KNOWN[way.kind]
         self.note.content = legend.TEXT.format(said)
 
     def show_state(self, page: "GraspPage") -> None:

@@ -100,7 +100,9 @@ def log_movements(stream: Any, policy: Policy, demos: Demonstrations, room: Room
         path, at = f"demonstrations/paths/{name}", f"demonstrations/now/{name}"
         # A line has one colour: a piece from each sample to the next has that of the first.
         pieces = np.stack([points[kept[:-1]], points[kept[1:]]], axis=1)
-        line = rr.LineStrips3D(pieces, colors=colors[kept[:-1]], radii=rr.Radius.ui_points(1.5))
+        line = rr.LineStrips3D(
+            pieces.astype(np.float32), colors=colors[kept[:-1]], radii=rr.Radius.ui_points(1.5)
+        )
         stream.log(path, line, static=True, strict=True)
         stream.log(at, rr.Points3D.from_fields(radii=rr.Radius.ui_points(5.0)), static=True, strict=True)
         columns = rr.Points3D.columns(positions=points[kept], colors=colors[kept])
@@ -111,7 +113,9 @@ def log_movements(stream: Any, policy: Policy, demos: Demonstrations, room: Room
         ):
             _log_series(stream, f"{kind}/recorded/{name}", indexes, values[kept], names)
         if chance is not None:
-            _log_series(stream, f"contact/recorded/{name}", indexes, chance[kept, None], ["probability of free"])
+            _log_series(
+                stream, f"contact/recorded/{name}", indexes, chance[kept, None], ["probability of free"]
+            )
     return notes
 
 
@@ -130,7 +134,9 @@ def log_field(stream: Any, policy: Policy, demos: Demonstrations, room: Room) ->
         notes.append("Ordinary regression's field is missing: the policy does not hold it.")
     else:
         fields["ordinary_regression"] = (regression, palette.DIRECT)
-    vectors = {name: room.place(each.predict(states).reshape(len(states), -1)) for name, (each, _) in fields.items()}
+    vectors = {
+        name: room.place(each.predict(states).reshape(len(states), -1)) for name, (each, _) in fields.items()
+    }
     speed = np.linalg.norm(vectors["learnt"], axis=1)
     usual = float(np.quantile(speed, USUAL)) or 1.0
     for name, each in vectors.items():
@@ -159,7 +165,9 @@ def log_rollout(stream: Any, movement: Demonstrations, room: Room) -> None:
     for code in range(movement.n_episodes):
         own = np.flatnonzero(movement.episodes == code)
         name = str(code)
-        path = rr.LineStrips3D([points[own]], colors=palette.rgb(palette.PATH), radii=rr.Radius.ui_points(3.0))
+        path = rr.LineStrips3D(
+            [points[own]], colors=palette.rgb(palette.PATH), radii=rr.Radius.ui_points(3.0)
+        )
         stream.log(f"rollout/paths/{name}", path, static=True, strict=True)
         at = f"rollout/now/{name}"
         style = rr.Points3D.from_fields(radii=rr.Radius.ui_points(8.0), colors=palette.rgb(palette.PATH))

@@ -81,11 +81,14 @@ def log_rerun(
     if not isinstance(policy, Policy):
         raise PolicyError(f"log_rerun writes a policy of unconstrain, got {type(policy).__name__}")
     check_is_fitted(policy)
-    wanted, given = (policy.n_features_in_, policy.n_actions_), (demos.states.shape[1], demos.actions.shape[1])
+    wanted, given = (
+        (policy.n_features_in_, policy.n_actions_),
+        (demos.states.shape[1], demos.actions.shape[1]),
+    )
     if wanted != given:
         raise DataError(
-            f"these recordings have {given[0]} states and {given[1]} actions, and the policy {wanted[0]} and {wanted[1]}: "
-            "give those it was learnt from, or others like them"
+            f"these recordings have {given[0]} states and {given[1]} actions, and the policy {wanted[0]} and "
+            f"{wanted[1]}: give those it was learnt from, or others like them"
         )
     room = Room.around(demos, coordinates)
     notes = list(room.notes)

@@ -52,8 +52,8 @@ def collect_shapes(
 ) -> tuple[dict[int, list[Shape]], tuple[str, ...]]:
     """Collect the shapes of each body: geoms of one colour are one shape.
 
-    Where a body has shapes made for the eye beside others that collide in another group, as bodies from URDF files have,
-    only the former are taken.
+    Where a body has shapes made for the eye beside others that collide in another group, as bodies from URDF files
+    have, only the former are taken.
 
     Parameters
     ----------
@@ -73,7 +73,9 @@ def collect_shapes(
     missed: list[str] = []
     for body in range(model.nbody):
         first = int(model.body_geomadr[body])
-        geoms = [geom for geom in range(first, first + int(model.body_geomnum[body])) if _is_shown(model, geom)]
+        geoms = [
+            geom for geom in range(first, first + int(model.body_geomnum[body])) if _is_shown(model, geom)
+        ]
         geoms = [geom for geom in geoms if model.geom(geom).name not in leave_out]
         merged: dict[tuple[Any, bool], list[tuple[Array, NDArray[np.int64]]]] = {}
         for geom in _for_the_eye(model, geoms):
@@ -88,7 +90,11 @@ def collect_shapes(
             merged.setdefault((_find_color(model, geom), is_flat), []).append((placed, faces))
         if merged:
             shapes[body] = [Shape(*_join(parts), *key) for key, parts in merged.items()]
-    notes = (f"not drawn, since they are neither meshes nor simple shapes: {', '.join(missed)}",) if missed else ()
+    notes = (
+        (f"not drawn, since they are neither meshes nor simple shapes: {', '.join(missed)}",)
+        if missed
+        else ()
+    )
     return shapes, notes
 
 
@@ -110,7 +116,10 @@ def _find_color(model: Any, geom: int) -> Color:
     color = model.mat_rgba[material].copy()
     texture = int(model.mat_texid[material, import_mujoco().mjtTextureRole.mjTEXROLE_RGB])
     if texture >= 0:
-        channels, pixels = int(model.tex_nchannel[texture]), int(model.tex_height[texture] * model.tex_width[texture])
+        channels, pixels = (
+            int(model.tex_nchannel[texture]),
+            int(model.tex_height[texture] * model.tex_width[texture]),
+        )
         start = int(model.tex_adr[texture])
         image = model.tex_data[start : start + pixels * channels].reshape(pixels, channels)
         color[:3] *= np.resize(image.mean(axis=0), 3) / 255.0
@@ -137,7 +146,8 @@ def _triangulate(model: Any, geom: int) -> tuple[Array, NDArray[np.int64], bool]
         made = trimesh.creation.box(2 * size)
     elif kind == kinds.mjGEOM_PLANE:
         half = np.where(size[:2] > 0, size[:2], PLANE_SIDE)
-        made = trimesh.Trimesh([(x, y, 0) for x in (-1, 1) for y in (-1, 1)] * np.array([*half, 0]), [(0, 2, 3), (0, 3, 1)])
+        corners = np.array([(x, y, 0) for x in (-1, 1) for y in (-1, 1)]) * [*half, 0]
+        made = trimesh.Trimesh(corners, [(0, 2, 3), (0, 3, 1)])
     elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_ELLIPSOID):
         made = trimesh.creation.icosphere(subdivisions=3)
         made.apply_scale(size if kind == kinds.mjGEOM_ELLIPSOID else size[0])

@@ -1,6 +1,7 @@
 """The program: what it prints, how it ends, and options that do not belong."""
 
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -121,13 +122,17 @@ def test_mistakes_about_the_robot_are_told_before_the_first_trial(program, tmp_p
         assert not list(tmp_path.iterdir())
 
 
-def test_without_a_display_there_is_nothing_to_view(program, monkeypatch):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(sys, "platform", "linux")
-    code, _, err = program("view")
-    assert code == 2
-    assert "no display" in err
+def test_pages_are_not_begun_at_a_port_that_is_taken(program):
+    pytest.importorskip("viser")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        for experiment in ("grasp", "cycle"):
+            code, _, err = program("view", experiment, "--port", port)
+            assert code == 2
+            assert f"port {port}" in err
+            assert len(err.splitlines()) == 1
 
 
 def test_ctrl_c_ends_with_one_line_and_says_what_is_kept(tmp_path):

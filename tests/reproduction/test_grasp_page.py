@@ -72,7 +72,7 @@ def pixel(camera, point, width, height):
 
 
 def test_the_page_in_a_browser(grasp, browser):
-    width, height = 1200, 800
+    width, height = 900, 600
     page = browser.new_page(viewport={"width": width, "height": height})
     errors, requests = [], []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
@@ -81,12 +81,10 @@ def test_the_page_in_a_browser(grasp, browser):
     page.wait_for_selector("canvas")
     page.get_by_text("Start anew once it rests").wait_for()
     assert wait_for(lambda: len(grasp.server.get_clients()) == 1)
-    for close in page.locator(".mantine-Notification-closeButton").all():
-        close.click()
-
     before = grasp.interaction.seconds
     assert wait_for(lambda: grasp.interaction.seconds > before, 5), "the robot moves"
     assert wait_for(lambda: "steps a second" in page.inner_text("body"))
+    grasp.is_paused = True  # software draws a robot that moves so slowly that all else waits
 
     def find_ball():
         from io import BytesIO
@@ -97,7 +95,7 @@ def test_the_page_in_a_browser(grasp, browser):
         red, green, blue = image.T
         return np.count_nonzero((red > 200) & (green > 90) & (green < 190) & (blue < 110))
 
-    assert wait_for(lambda: find_ball() > 1000), "the ball is orange, and in the picture"
+    assert wait_for(lambda: find_ball() > 500), "the ball is orange, and in the picture"
 
     box = page.locator("input[inputmode=decimal]").nth(1)
     box.fill("0.1")
@@ -111,8 +109,8 @@ def test_the_page_in_a_browser(grasp, browser):
     to_x, to_y = pixel(camera, handle + [0, -0.04, 0], width, height)
     page.mouse.move(x, y)
     page.mouse.down()
-    page.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=4)
-    page.mouse.move(to_x, to_y, steps=4)
+    page.mouse.move((x + to_x) / 2, (y + to_y) / 2)
+    page.mouse.move(to_x, to_y, steps=2)
     page.mouse.up()
     assert wait_for(lambda: grasp.interaction.in_the_way.aside < 0.07), "the handle is dragged to the right"
     assert grasp.interaction.in_the_way.aside == pytest.approx(0.0, abs=0.03)

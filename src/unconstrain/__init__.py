@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
     from unconstrain.selection import select_policy
+    from unconstrain.viewer import view
 
     __version__: str
 
@@ -85,6 +86,7 @@ __all__ = [
     "select_policy",
     "spaces",
     "torch",
+    "view",
 ]
 
 _HOMES = {
@@ -121,6 +123,7 @@ _HOMES = {
     "unconstrain.scaling.stream": ("fit_stream",),
     "unconstrain.selection": ("select_policy",),
     "unconstrain.version": ("__version__",),
+    "unconstrain.viewer": ("view",),
 }
 
 _NAMESPACES = {

@@ -10,7 +10,7 @@ LONGEST = 0.9
 LEAST = 0.15
 """Of the longest arrow: shorter ones would show no direction."""
 SIDES = 8
-SHAFT, HEAD, HEAD_BEGINS = 0.022, 0.075, 0.68
+SHAFT, HEAD, HEAD_BEGINS = 0.035, 0.11, 0.62
 """Radii of an arrow of length one, and where its head begins."""
 
 

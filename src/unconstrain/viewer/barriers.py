@@ -1,9 +1,9 @@
 """A plane and a box as constraints of a rollout.
 
-A barrier takes away motion into it, and nothing else: where the next step, by the speed with which the policy moves what
-is shown, would lead into the barrier, the component of that speed along the barrier's normal is taken away for this
-step. What slides along a barrier, or leaves it, is free. So a movement stops short of the surface by less than a step,
-there is no friction, and what begins inside may only go outwards.
+A barrier takes away motion into it, and nothing else: where the next step, by the speed with which the policy moves
+what is shown, would lead into the barrier, the component of that speed along the barrier's normal is taken away for
+this step. What slides along a barrier, or leaves it, is free. So a movement stops short of the surface by less than a
+step, there is no friction, and what begins inside may only go outwards.
 """
 
 from collections.abc import Sequence

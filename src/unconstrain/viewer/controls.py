@@ -60,6 +60,7 @@ class Controls:
         which = self.page.stage.coordinates.which  # type: ignore[attr-defined]
         options = (tuple(names), tuple(names), (NONE, *names))
         chosen = [names[each] for each in which] + [NONE] * (3 - len(which))
+        self.axes: list[Any] = []
         if len(names) == 2:
             return
         self.axes = [
@@ -69,7 +70,8 @@ class Controls:
 
         def pick(event: Any) -> None:
             picked = [names.index(each.value) for each in self.axes if each.value != NONE]
-            if len(set(picked)) == len(picked):
+            # While all three are set one after the other, two may be the same for a moment.
+            if event.client is not None and len(set(picked)) == len(picked):
                 page.show_coordinates(picked)
 
         for each in self.axes:
@@ -80,27 +82,42 @@ class Controls:
     def _add_rollout(self) -> None:
         page, gui = self.page, self.gui
         with gui.add_folder("Rollout"):
-            self.seconds = gui.add_slider(
-                "Lasts (s)", *_range(page.stage.seconds), initial_value=page.stage.seconds
-            )
+            self.seconds = gui.add_slider("Lasts (s)", *_range(page.stage.seconds), page.stage.seconds)
             self.seconds.on_update(lambda event: page.set_seconds(self.seconds.value))
             self.obstacles = gui.add_dropdown(
                 "In its way", (obstacles.NOTHING, obstacles.PLANE, obstacles.BOX, obstacles.BOTH)
             )
             self.obstacles.on_update(lambda event: page.put_in_the_way(self.obstacles.value))
-            sides = page.obstacle_sides()
-            self.sides = gui.add_vector3("Box sides", tuple(sides), min=(0.0, 0.0, 0.0), visible=False)
-            self.sides.on_update(lambda event: page.resize_box(np.array(self.sides.value)))
+            side = page.obstacles.side_in_units(page.stage)
+            self.side = gui.add_slider("Box side", *_range(side), side, visible=False)
+            self.side.on_update(lambda event: page.resize_box(self.side.value))
             if page.stage.under is not None:
                 self.under = gui.add_checkbox("Under the given constraint", True)
                 self.under.on_update(lambda event: page.follow_under(self.under.value))
-            self.time = gui.add_slider("Time (s)", *_range(page.stage.seconds / 4.0), initial_value=0.0)
+            self.time = gui.add_slider("Time (s)", 0.0, page.stage.seconds, page.stage.seconds / 200.0, 0.0)
             self.time.on_update(self._sought)
             self.play = gui.add_button_group("Play", ("play", "pause", "to start"))
             self.play.on_click(lambda event: page.control_time(event.target.value))
             self.speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1")
-            self.speed.on_update(lambda event: page.set_speed(float(self.speed.value)))
+            self.speed.on_update(lambda event: setattr(page.timeline, "speed", float(self.speed.value)))
             self.ending = gui.add_html("")
+
+    def show_axes(self, which: list[int]) -> None:
+        """Show which numbers are shown."""
+        names = [self.page.stage.axes.names[each] for each in which]
+        for dropdown, name in zip(self.axes, [*names, NONE], strict=False):
+            dropdown.value = name
+
+    def show_seconds(self, seconds: float) -> None:
+        """Let the slider of the time end where rollouts do, and show how long that is."""
+        self.seconds.value = seconds
+        self.time.max = seconds
+        self.time.value = min(self.time.value, seconds)
+
+    def show_side(self, side: float) -> None:
+        """Show how long the box is, in the units of what is shown."""
+        self.side.min, self.side.max, self.side.step = _range(side)
+        self.side.value = side
 
     def _sought(self, event: Any) -> None:
         if event.client is not None:  # not when the time line itself moved it
@@ -108,7 +125,7 @@ class Controls:
 
     def _add_others(self) -> None:
         """Add a slider for each number that is not shown, by which the start is moved along it."""
-        page, stage = self.page, self.page.stage
+        stage = self.page.stage
         self.others: list[Any] = []
         if not isinstance(stage.coordinates, Picked) or len(stage.axes.names) < 3:
             return
@@ -153,6 +170,5 @@ class Controls:
 
 
 def _range(usual: float) -> tuple[float, float, float]:
-    """Return the least, the largest and the step of a slider around a usual number of seconds."""
-    largest = float(f"{4.0 * usual:.2g}")
-    return 0.0, largest, largest / 400.0
+    """Return the least, the largest and the step of a slider around a usual number."""
+    return usual / 40.0, 4.0 * usual, usual / 40.0

@@ -171,12 +171,14 @@ def _describe(space: Space, names: Sequence[str], base: Array) -> tuple[tuple[st
             _describe(part, [names[i] for i in columns], base[list(columns)])
             for part, columns in zip(space.parts, space.columns, strict=True)
         ]
-        return tuple(name for part, _ in parts for name in part), np.concatenate([added for _, added in parts])
+        return tuple(name for part, _ in parts for name in part), np.concatenate(
+            [added for _, added in parts]
+        )
     if isinstance(space, Vector):
         units = space.units
-        named = [name if unit == "1" else f"{name} ({unit})" for name, unit in zip(names, units, strict=False)]
+        named = [
+            name if unit == "1" else f"{name} ({unit})" for name, unit in zip(names, units, strict=False)
+        ]
         return tuple(named[: space.n_states]), np.asarray(base[: space.n_states])
     shared = space.action_names(names)
     return tuple(f"turned about {name[-1]} (rad)" for name in shared), np.zeros(space.n_actions)
-
-

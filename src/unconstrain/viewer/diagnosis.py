@@ -57,7 +57,7 @@ class Diagnosis:
             self.words = "Without recordings it is not known what they determine."
             return
         try:
-            report = identifiability(stage.policies[LEARNT], self._demos)  # type: ignore[arg-type]
+            report = identifiability(stage.policies[LEARNT], self._demos)
             self._planned = report.next_recordings(NEXT)
         except UnconstrainError as error:
             self.words = f"Not known: {error}."
@@ -67,7 +67,8 @@ class Diagnosis:
         self.words = (
             f"Determined: {report.determined_share:.1%} of the policy's directions. "
             f"A recording at each marker, in which motion along its arrow is free, lessens the expected squared error "
-            f"of what is left: {lessens}."
+            f"of what is left: {lessens}. Ellipses are one standard deviation of the policy each way, drawn in "
+            "proportion to the root of their size."
         )
 
     def _draw_ellipses(self, stage: Stage, report: Identifiability) -> None:
@@ -89,18 +90,20 @@ class Diagnosis:
         for k, each in enumerate(self._planned, 1):
             x = each.state[None]
             at = stage.places(x, lift=LIFT)[0]
-            along = stage.frame.vectors((stage.coordinates.tangents(x) @ each.direction))[0]
+            along = stage.frame.vectors(stage.coordinates.tangents(x) @ each.direction)[0]
             along *= ARROW * extent / (float(np.linalg.norm(along)) or 1.0)
             self._handles += [
                 scene.add_arrows(
                     f"/next/{k}/arrow",
                     np.stack([[at - along / 2, at + along / 2], [at + along / 2, at - along / 2]]),
-                    palette.rgb(palette.HELD),
+                    palette.linear(np.array(palette.rgb(palette.HELD))),
                     shaft_radius=0.006 * extent,
                     head_radius=0.018 * extent,
                     head_length=0.035 * extent,
                 ),
-                scene.add_label(f"/next/{k}/label", f"record next: {k}", position=tuple(at), anchor="bottom-left"),
+                scene.add_label(
+                    f"/next/{k}/label", f"record next: {k}", position=tuple(at), anchor="bottom-left"
+                ),
             ]
 
 
@@ -130,7 +133,7 @@ def _ellipsoids(stage: Stage, places: Array, lengths: Array, vectors: Array) -> 
         batched_wxyzs=Rotation.from_matrix(right_handed).as_quat(scalar_first=True),
         batched_positions=places,
         batched_scales=np.maximum(lengths, 0.02 * lengths.max()).astype(np.float32),
-        batched_colors=palette.rgb(palette.UNKNOWN),
+        batched_colors=palette.linear(np.array(palette.rgb(palette.UNKNOWN))),
         opacity=0.35,
         lod="off",
         cast_shadow=False,
@@ -153,7 +156,9 @@ def ball(around: int = 16, rings: int = 8) -> tuple[Array, NDArray[np.uint32]]:
     faces : ndarray of shape (F, 3)
         Triangles of them.
     """
-    polar, azimuth = np.meshgrid(np.linspace(0, np.pi, rings + 1), 2 * np.pi * np.arange(around) / around, indexing="ij")
+    polar, azimuth = np.meshgrid(
+        np.linspace(0, np.pi, rings + 1), 2 * np.pi * np.arange(around) / around, indexing="ij"
+    )
     vertices = np.stack(
         [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
     ).reshape(-1, 3)

@@ -103,7 +103,9 @@ def svg(stage: Stage, sureness: Sureness) -> bytes:
         if held.any():
             ax.plot(*path[held].T, ".", color=palette.HELD, ms=5, label="something in its way")
         ax.plot(*path[:1].T, "o", color=palette.LEARNT, ms=8, label="start")
-    for name, set_label in zip(stage.coordinates.names, ("set_xlabel", "set_ylabel", "set_zlabel"), strict=False):
+    for name, set_label in zip(
+        stage.coordinates.names, ("set_xlabel", "set_ylabel", "set_zlabel"), strict=False
+    ):
         getattr(ax, set_label)(name)
     ax.legend(frameon=False, fontsize=8, loc="upper right")
     buffer = io.BytesIO()

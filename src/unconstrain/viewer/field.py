@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.demonstrations import Demonstrations
 from unconstrain.features.centers import farthest_first
 from unconstrain.spaces import SecondOrder
 from unconstrain.viewer import arrows, palette, streams
@@ -26,9 +27,16 @@ RECORDED, HELD = "recorded states", "the others as at the start"
 
 
 class Field:
-    """Arrows and stream lines of the policy that is shown."""
+    """Arrows and stream lines of the policy that is shown.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    demos : Demonstrations, optional
+        All recordings.
+    """
+
+    def __init__(self, demos: Demonstrations | None) -> None:
+        self._demos = demos
         self._arrows: Any = None
         self._streams: Any = None
         self._sureness: dict[str, Sureness] = {}
@@ -38,19 +46,18 @@ class Field:
     def sureness(self, stage: Stage) -> Sureness:
         """Return how sure the policy is that is shown."""
         if stage.name not in self._sureness:
-            self._sureness[stage.name] = Sureness(stage.policy)
+            self._sureness[stage.name] = Sureness(stage.policy, self._demos)
         return self._sureness[stage.name]
 
     def draw(self, stage: Stage) -> None:
         """Draw both; see `Part`."""
         colour = palette.DIRECT if stage.name == DIRECT else palette.LEARNT
-        # The new one is there before the old one goes, so that nothing flickers: a name that is taken is replaced.
-        self._arrows = self._draw_arrows(stage, colour) if self.shows_arrows else _gone(self._arrows)
-        self._streams = self._draw_streams(stage, colour) if self.shows_streams else _gone(self._streams)
+        self._arrows = _replaced(self._arrows, self._draw_arrows(stage, colour))
+        self._streams = _replaced(self._streams, self._draw_streams(stage, colour))
 
     def _draw_arrows(self, stage: Stage, colour: str) -> Any:
-        if isinstance(stage.policy.space_, SecondOrder):
-            return _gone(self._arrows)
+        if not self.shows_arrows or isinstance(stage.policy.space_, SecondOrder):
+            return None
         X, spacing = stand(stage, self.through)
         U = stage.policy.predict(X).reshape(len(X), -1)
         V = stage.frame.vectors(np.einsum("nkd,nd->nk", stage.coordinates.tangents(X), U))
@@ -62,7 +69,7 @@ class Field:
             batched_wxyzs=arrows.turns(V),
             batched_positions=stage.places(X, lift=LIFT),
             batched_scales=(spacing * arrows.arrow_lengths(V)).astype(np.float32),
-            batched_colors=palette.rgb(colour),
+            batched_colors=palette.linear(np.array(palette.rgb(colour))),
             batched_opacities=self.sureness(stage)(X),
             lod="off",
             side="double",
@@ -71,10 +78,12 @@ class Field:
         )
 
     def _draw_streams(self, stage: Stage, colour: str) -> Any:
+        if not self.shows_streams:
+            return None
         pieces, X = streams.segments(stage)
         if not len(pieces):
-            return _gone(self._streams)
-        colours = palette.blend(0.75 * self.sureness(stage)(X), BACKGROUND, colour)
+            return None
+        colours = palette.linear(palette.blend(self.sureness(stage)(X), BACKGROUND, colour))
         return stage.server.scene.add_line_segments(
             "/streams",
             pieces,
@@ -103,7 +112,7 @@ def stand(stage: Stage, through: str = RECORDED) -> tuple[Array, float]:
     """
     frame, axes, shown = stage.frame, stage.axes, len(stage.coordinates.names)
     if frame.is_flat and shown == len(axes.names) == stage.states.shape[1] == 2:
-        low, high, _ = limits(frame)
+        low, high = limits(frame)
         spacing = float((high - low).max()) / (ALONG - 1)
         counts = np.maximum(np.round((high - low) / spacing).astype(int) + 1, 2)
         grid = np.meshgrid(*(np.linspace(a, b, k) for a, b, k in zip(low, high, counts, strict=True)))
@@ -116,6 +125,8 @@ def stand(stage: Stage, through: str = RECORDED) -> tuple[Array, float]:
     return X, LONGEST[False] * frame.extent
 
 
-def _gone(handle: Any) -> None:
-    if handle is not None:
-        handle.remove()
+def _replaced(old: Any, new: Any) -> Any:
+    """Return the new handle; one of the same name has taken the old one's place already."""
+    if old is not None and new is None:
+        old.remove()
+    return new

@@ -82,10 +82,12 @@ class Follower:
     ----------
     policy : Policy
         Fitted.
+    state_names : sequence of str, optional
+        Of the n states.
     """
 
-    def __init__(self, policy: Policy) -> None:
-        self.policy = policy
+    def __init__(self, policy: Policy, state_names: Sequence[str] | None = None) -> None:
+        self.policy, self.state_names = policy, state_names
         self._step = None if policy.stability_ is not None else Compiled(policy)
         self._recorded = Recorded(policy)
 
@@ -126,7 +128,13 @@ class Follower:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MovementStopped)  # which the page says
             return simulate(
-                policy, wanted.start, STEPS, dt, project=project if constrained else None, guards=guards
+                policy,
+                wanted.start,
+                STEPS,
+                dt,
+                project=project if constrained else None,
+                guards=guards,
+                state_names=self.state_names,
             )
 
 

@@ -55,7 +55,9 @@ def describe_rollout(movement: Movement) -> str:
         HTML.
     """
     dt = 0.0 if movement.time is None or len(movement) < 2 else float(movement.time[1] - movement.time[0])
-    end = ", ".join(f"{name} {value:.4g}" for name, value in zip(movement.state_names, movement.states[-1], strict=True))
+    end = ", ".join(
+        f"{name} {value:.4g}" for name, value in zip(movement.state_names, movement.states[-1], strict=True)
+    )
     said = [f"{len(movement) - 1} steps of {dt:.3g} s; then {end}."]
     held = is_held(movement).mean()
     if held:

@@ -43,7 +43,7 @@ class Movements:
             self._handle = scene.add_line_segments(
                 "/movements",
                 P[pairs],
-                colours[pairs],
+                palette.linear(colours)[pairs],
                 thickness=THICKNESS,
                 thickness_units="screen",
                 visible=self.visible,
@@ -51,5 +51,10 @@ class Movements:
         else:
             size = 0.012 * stage.frame.extent
             self._handle = scene.add_point_cloud(
-                "/movements", P, colours, point_size=size, point_shape="circle", visible=self.visible
+                "/movements",
+                P,
+                palette.linear(colours),
+                point_size=size,
+                point_shape="circle",
+                visible=self.visible,
             )

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 
 from unconstrain.viewer import palette
 from unconstrain.viewer.barriers import Barrier, Box, Plane
+from unconstrain.viewer.frame import Frame
 from unconstrain.viewer.stage import Stage
 
 Array = NDArray[np.float64]
 
 NOTHING, PLANE, BOX, BOTH = "nothing", "a plane", "a box", "a plane and a box"
-SHEET, THIN = 0.9, 0.008
-"""Side and thickness of the plane that is drawn, as shares of the scene's extent."""
+SHEET, THIN = {True: 3.0, False: 1.5}, 0.008
+"""Side of the plane that is drawn, where all is flat and in space, and its thickness, as shares of the scene's extent:
+it goes on for ever."""
 BEGINS = 0.22
 """Side of the box at first, as a share of the scene's extent."""
 HANDLE = 0.18
@@ -34,16 +36,17 @@ class Obstacles:
         self._handles: dict[str, Any] = {}
         self._body: Any = None
         self._stage: Stage | None = None
+        self._frame: Frame | None = None
         self.chosen = NOTHING
-        self.sides = np.ones(3)
+        self.side = 1.0
 
     def draw(self, stage: Stage) -> None:
         """Draw those that are chosen, anew if what is shown changed; see `Part`."""
-        if self._stage is not stage or self._of_frame is not stage.frame:
-            self.sides = np.full(3, BEGINS * stage.frame.extent)
+        if self._stage is not stage or self._frame is not stage.frame:
+            self.side = BEGINS * stage.frame.extent
             for handle in self._handles.values():
                 handle.remove()
-            self._handles, self._stage, self._of_frame = {}, stage, stage.frame
+            self._handles, self._stage, self._frame = {}, stage, stage.frame
         wanted = {PLANE: [PLANE], BOX: [BOX], BOTH: [PLANE, BOX]}.get(self.chosen, [])
         for name in (PLANE, BOX):
             if name in wanted and name not in self._handles:
@@ -65,9 +68,14 @@ class Obstacles:
         self.draw(stage)
         self._changed()
 
-    def resize(self, sides: Array) -> None:
-        """Make the box of other sides (3,), in the scene."""
-        self.sides = sides
+    def side_in_units(self, stage: Stage) -> float:
+        """Return the side of the box in the units of what is shown."""
+        self.draw(stage)
+        return self.side / stage.frame.scale
+
+    def resize(self, side: float) -> None:
+        """Make the box of another side, in the scene."""
+        self.side = side
         if self._body is not None and self._stage is not None:
             self._body.dimensions = self._drawn_sides(self._stage)
         self._changed()
@@ -86,7 +94,7 @@ class Obstacles:
             handle = self._handles[PLANE]
             found.append(Plane(np.array(handle.position), _first_axis(np.array(handle.wxyz))))
         if self.chosen in (BOX, BOTH):
-            sides = self.sides.copy()
+            sides = np.full(3, self.side)
             if self._stage is not None:
                 sides[len(self._stage.coordinates.names) :] = np.inf
             found.append(Box(np.array(self._handles[BOX].position), sides))
@@ -96,8 +104,10 @@ class Obstacles:
         scene, frame, extent = stage.server.scene, stage.frame, stage.frame.extent
         # The plane begins on the far side of where the rollout starts, facing it.
         begin = stage.places(stage.start[None])[0]
-        at = begin + 0.6 * (frame.middle - begin)
-        at = at + np.array([0.15 * extent, 0.0, 0.0]) if np.allclose(at, begin, atol=0.05 * extent) else at
+        towards = frame.middle - begin
+        far = float(np.linalg.norm(towards))
+        towards = towards / far if far > 0.05 * extent else np.array([1.0, 0.0, 0.0])
+        at = begin + max(0.6 * far, self.side) * towards
         handle = scene.add_transform_controls(
             f"/{'plane' if name == PLANE else 'box'}",
             scale=HANDLE * extent,
@@ -107,10 +117,11 @@ class Obstacles:
             position=tuple(at),
             wxyz=_facing(begin - at) if name == PLANE else (1.0, 0.0, 0.0, 0.0),
         )
-        style = dict(color=palette.rgb(palette.HELD), opacity=0.35, cast_shadow=False, receive_shadow=False)
+        style: dict[str, Any] = {"opacity": 0.35, "cast_shadow": False, "receive_shadow": False}
+        style["color"] = palette.rgb(palette.HELD)
         if name == PLANE:
-            high = 0.04 * extent if frame.is_flat else SHEET * extent
-            sheet = (THIN * extent, SHEET * extent, high)
+            high = 0.04 * extent if frame.is_flat else SHEET[False] * extent
+            sheet = (THIN * extent, SHEET[frame.is_flat] * extent, high)
             # What is drawn lies behind the surface that bars the way.
             scene.add_box("/plane/sheet", dimensions=sheet, position=(-THIN * extent / 2, 0.0, 0.0), **style)
         else:
@@ -123,8 +134,7 @@ class Obstacles:
         return handle
 
     def _drawn_sides(self, stage: Stage) -> tuple[float, float, float]:
-        x, y, z = self.sides.tolist()
-        return x, y, 0.04 * stage.frame.extent if stage.frame.is_flat else z
+        return self.side, self.side, 0.04 * stage.frame.extent if stage.frame.is_flat else self.side
 
 
 def _first_axis(wxyz: Array) -> Array:

@@ -107,7 +107,9 @@ def view(
     if other is not None and policy.risk != "direct":
         policies[DIRECT] = other
     if isinstance(policy.space_, SecondOrder):
-        notes.append("actions are accelerations, so there are no arrows over places; rollouts begin as recorded ones do")
+        notes.append(
+            "actions are accelerations, so there are no arrows over places; rollouts begin as recorded ones do"
+        )
     served = server.start(host, port)
     stage = Stage(
         server=served,
@@ -123,7 +125,7 @@ def view(
     try:
         return Page(stage, demos, notes)
     except BaseException:
-        served.stop()
+        server.stop(served)
         raise
 
 
@@ -180,7 +182,9 @@ def _rows(constraint: Any, d: int) -> Callable[[Array], Array]:
 
     trial = np.zeros((1, d)) if callable(constraint) else rows(np.zeros((1, d)))[0]
     if trial.ndim != 2 or trial.shape[-1] != d:
-        raise DataError(f"constraint= must be rows of {d} numbers, one for each action, got shape {np.shape(constraint)}")
+        raise DataError(
+            f"constraint= must be rows of {d} numbers, one for each action, got shape {trial.shape}"
+        )
     return rows
 
 

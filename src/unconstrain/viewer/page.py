@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import UnconstrainError
 from unconstrain.stopping import Movement
-from unconstrain.viewer import exporting, legend
+from unconstrain.viewer import exporting, legend, server
 from unconstrain.viewer.controls import Controls
 from unconstrain.viewer.coordinates import Picked
 from unconstrain.viewer.diagnosis import Diagnosis
@@ -20,7 +21,7 @@ from unconstrain.viewer.movements import Movements
 from unconstrain.viewer.newest import Newest
 from unconstrain.viewer.obstacles import BOTH, BOX, Obstacles
 from unconstrain.viewer.path import Path
-from unconstrain.viewer.stage import Stage
+from unconstrain.viewer.stage import Part, Stage
 from unconstrain.viewer.start import Start
 from unconstrain.viewer.surroundings import Surroundings
 from unconstrain.viewer.timeline import Timeline
@@ -52,10 +53,12 @@ class Page:
         self.stage, self.notes = stage, notes
         self._closed = threading.Event()
         self._state_listeners: list[Callable[[Array], None]] = []
-        self._followers = {name: Follower(policy) for name, policy in stage.policies.items()}
+        self._followers = {
+            name: Follower(policy, stage.shown.demos.state_names) for name, policy in stage.policies.items()
+        }
         self._point: Array | None = None
         self._is_under = stage.under is not None
-        self.movements, self.field, self.diagnosis = Movements(), Field(), Diagnosis(demos)
+        self.movements, self.field, self.diagnosis = Movements(), Field(demos), Diagnosis(demos)
         self.surroundings, self.path = Surroundings(), Path(stage)
         self._following = Newest(self._follow, self._fail)
         self._drawing = Newest(self._draw, self._fail)
@@ -90,7 +93,7 @@ class Page:
         self.timeline.close()
         self._following.close()
         self._drawing.close()
-        self.stage.server.stop()
+        server.stop(self.stage.server)
 
     def settle(self, timeout: float = 30.0) -> bool:
         """Wait until all that was asked for is drawn.
@@ -141,6 +144,7 @@ class Page:
     def show_field(self, arrows: bool, streams: bool) -> None:
         """Show the field as arrows, stream lines, both or not at all."""
         self.field.shows_arrows, self.field.shows_streams = arrows, streams
+        self.controls.arrows.value, self.controls.streams.value = arrows, streams
         self.redraw()
 
     def show_through(self, through: str) -> None:
@@ -150,7 +154,7 @@ class Page:
 
     def show_diagnosis(self, visible: bool) -> None:
         """Show what is not determined, which is computed the first time."""
-        self.diagnosis.visible = visible
+        self.diagnosis.visible = self.controls.unknown.value = visible
         self.controls.diagnosis.visible = visible
         self.controls.diagnosis.content = legend.describe_notes(
             [self.diagnosis.words or "computing what the recordings determine"]
@@ -166,11 +170,14 @@ class Page:
             Two or three.
         """
         stage = self.stage
+        if isinstance(stage.coordinates, Picked) and stage.coordinates.which == which:
+            return
         coordinates = Picked(stage.axes, which)
+        self.controls.show_axes(which)
         stage.coordinates, stage.frame = coordinates, Frame.around(coordinates.place(stage.states))
         for k, slider in enumerate(self.controls.others):
             slider.visible = k not in which
-        self.controls.sides.value = tuple(self.obstacle_sides())
+        self.controls.show_side(self.obstacles.side_in_units(stage))
         self._look(stage)
         self.redraw()
         self.follow()
@@ -178,21 +185,18 @@ class Page:
     def set_seconds(self, seconds: float) -> None:
         """Say how long rollouts last."""
         self.stage.seconds = max(float(seconds), 1e-3)
+        self.controls.show_seconds(self.stage.seconds)
         self.follow()
 
     def put_in_the_way(self, chosen: str) -> None:
         """Put a plane, a box, both or nothing in the way of the rollout."""
-        self.controls.sides.visible = chosen in (BOX, BOTH)
+        self.controls.obstacles.value = chosen
+        self.controls.side.visible = chosen in (BOX, BOTH)
         self.obstacles.choose(chosen, self.stage)
 
-    def obstacle_sides(self) -> Array:
-        """Return the sides (3,) of the box in the units of what is shown."""
-        self.obstacles.draw(self.stage)
-        return np.round(self.obstacles.sides / self.stage.frame.scale, 6)
-
-    def resize_box(self, sides: Array) -> None:
-        """Make the box of other sides (3,), in the units of what is shown."""
-        self.obstacles.resize(np.maximum(sides, 0.0) * self.stage.frame.scale)
+    def resize_box(self, side: float) -> None:
+        """Make the box of another side, in the units of what is shown."""
+        self.obstacles.resize(side * self.stage.frame.scale)
 
     def follow_under(self, is_under: bool) -> None:
         """Follow the policy under the constraint that was given, or freely."""
@@ -226,10 +230,6 @@ class Page:
             if what == "to start":
                 self.timeline.go_to(0.0)
 
-    def set_speed(self, speed: float) -> None:
-        """Say how many seconds of the rollout pass in one."""
-        self.timeline.speed = speed
-
     def draw_svg(self) -> bytes:
         """Draw the picture as SVG, with matplotlib."""
         return exporting.svg(self.stage, self.field.sureness(self.stage))
@@ -249,9 +249,16 @@ class Page:
 
     def _draw(self, _: None) -> None:
         stage = self.stage
-        for part in (self.surroundings, self.movements, self.field, self.path, self.start, self.obstacles):
-            part.draw(stage)
-        self.diagnosis.draw(stage)
+        # What takes long comes last, and what fails stops nothing else.
+        quick: tuple[Part, ...] = (self.surroundings, self.movements, self.path, self.start, self.obstacles)
+        for part in (*quick, self.field, self.diagnosis):
+            try:
+                part.draw(stage)
+            except UnconstrainError as error:
+                self._fail(error)
+        why_not = self.field.sureness(stage).why_not
+        if why_not:
+            self.say(f"opacity is by distance from recorded states only: {why_not}")
         if self.diagnosis.visible:
             self.controls.diagnosis.content = legend.describe_notes([self.diagnosis.words])
 
@@ -264,24 +271,36 @@ class Page:
         for listener in self._state_listeners:
             listener(state)
 
+    def say(self, note: str) -> None:
+        """Say something on the page, once.
+
+        Parameters
+        ----------
+        note : str
+            A sentence.
+        """
+        if note not in self.notes:
+            self.notes.append(note)
+            self.controls.notes.visible = True
+            self.controls.notes.content = legend.describe_notes(self.notes)
+
     def _fail(self, error: Exception) -> None:
-        self.controls.notes.visible = True
-        self.controls.notes.content = legend.describe_notes([*self.notes, str(error)])
+        self.say(str(error))
 
     def _look(self, stage: Stage) -> None:
         """Put the camera where all of the scene is seen, from above what is flat."""
-        server, frame = stage.server, stage.frame
+        served, frame = stage.server, stage.frame
         middle, reach = frame.middle, frame.extent
         flat = frame.is_flat
-        server.scene.set_up_direction("+y" if flat else "+z")
-        away = np.array([0.0, 0.0, 1.95]) if flat else np.array([1.0, -1.35, 0.85])
+        served.scene.set_up_direction("+y" if flat else "+z")
+        away = np.array([0.0, 0.0, 1.95]) if flat else np.array([1.2, -1.6, 1.0])
         aside = np.array([0.22, 0.0, 0.0]) if flat else np.array([0.12, 0.09, 0.0])
-        camera: Any = server.initial_camera
+        camera: Any = served.initial_camera
         camera.fov = 0.7
         camera.up = (0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0)
         camera.look_at = tuple(middle + reach * aside)
         camera.position = tuple(middle + reach * (aside + away))
-        for client in server.get_clients().values():
+        for client in served.get_clients().values():
             client.camera.up_direction = camera.up
             client.camera.position = camera.position
             client.camera.look_at = camera.look_at

@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from unconstrain.plot import colors
 
+LEARNT, DIRECT, RECORDED = colors.LEARNT, colors.DIRECT, colors.RECORDED
+
 FREE, CONSTRAINED = "#009E73", "#CC79A7"
 """Recorded samples: free, and under a constraint."""
 PATH, HELD = "#000000", "#E69F00"
@@ -38,4 +40,18 @@ def blend(share: NDArray[np.float64], first: str, second: str) -> NDArray[np.uin
     return np.round(a + np.clip(share, 0.0, 1.0)[:, None] * (b - a)).astype(np.uint8)
 
 
-LEARNT, DIRECT, RECORDED = colors.LEARNT, colors.DIRECT, colors.RECORDED
+def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Undo sRGB's curve, which viser's browser applies to a colour for each point or arrow, but not to one for all.
+
+    Parameters
+    ----------
+    colours : ndarray of shape (..., 3)
+        Numbers to 255, in sRGB.
+
+    Returns
+    -------
+    ndarray of shape (..., 3)
+        Numbers to 255 that are seen as these colours.
+    """
+    c = np.asarray(colours, dtype=np.float64) / 255.0
+    return np.round(255.0 * np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)).astype(np.uint8)

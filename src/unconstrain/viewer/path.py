@@ -1,7 +1,5 @@
 """The rollout: its line, in another colour where something is in its way, and a marker for the time line."""
 
-from typing import Any
-
 import numpy as np
 
 from unconstrain.stopping import Movement
@@ -28,12 +26,20 @@ class Path:
         nothing = np.zeros((1, 2, 3))
         self._lines = [
             stage.server.scene.add_line_segments(
-                name, nothing, palette.rgb(colour), thickness=THICKNESS, thickness_units="screen", visible=False
+                name,
+                nothing,
+                palette.rgb(colour),
+                thickness=THICKNESS,
+                thickness_units="screen",
+                visible=False,
             )
             for name, colour in (("/path/free", palette.PATH), ("/path/held", palette.HELD))
         ]
-        self._marker = stage.server.scene.add_icosphere("/path/now", radius=1.0, color=palette.rgb(palette.HELD))
+        self._marker = stage.server.scene.add_icosphere(
+            "/path/now", radius=1.0, color=palette.rgb(palette.HELD)
+        )
         self._end = stage.server.scene.add_icosphere("/path/end", radius=1.0, color=palette.rgb(palette.PATH))
+        self.draw(stage)
 
     def draw(self, stage: Stage) -> None:
         """Draw it anew where coordinates changed; see `Part`."""

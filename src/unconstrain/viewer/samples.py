@@ -112,7 +112,10 @@ def judge(policy: Policy, demos: Demonstrations) -> tuple[Array | None, str]:
     if N is not None and known.any():
         whole = np.abs(N[known] - np.eye(N.shape[-1])).max(axis=(1, 2)) < ROUNDING
         free[known] = whole
-        source = "recorded" if known.all() or source == "recorded" else f"recorded for {known.mean():.0%} of the samples"
+        if known.all() or source == "recorded":
+            source = "recorded"
+        else:
+            source = f"recorded for {known.mean():.0%} of the samples"
     return free, source
 
 

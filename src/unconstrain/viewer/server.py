@@ -40,8 +40,25 @@ def start(host: str = HOST, port: int = PORT) -> Any:
     check_port(host, port)
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints a panel of its own
         server = viser.ViserServer(host=host, port=port, label="unconstrain", verbose=False)
+    # Colours are to be seen as they are in the legend: light from everywhere, and a little from the front for shape.
+    server.scene.configure_environment_map(hdri=None)
+    server.scene.configure_default_lights(enabled=False, cast_shadow=False)
+    server.scene.add_light_ambient("/light/everywhere", intensity=2.3)
+    server.scene.add_light_directional("/light/front", intensity=0.9, position=(1.0, -1.0, 3.0))
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
     return server
+
+
+def stop(server: Any) -> None:
+    """End a server.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+        From `start`.
+    """
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a line of its own
+        server.stop()
 
 
 def check_port(host: str, port: int) -> None:

@@ -47,14 +47,14 @@ def segments(stage: Stage) -> tuple[Array, Array]:
 def _in_plane(stage: Stage) -> tuple[Array, Array]:
     from matplotlib.figure import Figure
 
-    low, high, _ = limits(stage.frame)
+    low, high = limits(stage.frame)
     x, y = (np.linspace(a, b, CELLS) for a, b in zip(low, high, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     order = np.argsort(getattr(stage.coordinates, "which", [0, 1]))
     U = stage.policy.predict(grid[:, order])[:, np.argsort(order)]
     u, v = U.T.reshape(2, CELLS, CELLS)
     ax = Figure().subplots()
-    drawn = ax.streamplot(x, y, u, v, density=DENSITY, arrowsize=0)
+    drawn = ax.streamplot(x, y, u, v, density=DENSITY, arrowstyle="-")
     lines = drawn.lines.get_segments()
     pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
     scene = stage.frame.to_scene(pieces.reshape(-1, 2)).reshape(-1, 2, 3)
@@ -67,9 +67,7 @@ def _by_rollouts(stage: Stage) -> tuple[Array, Array]:
     step: Any = policy if policy.stability_ is not None else Compiled(policy)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MovementStopped)
-        movement = simulate(
-            step, starts, STEPS, LASTS * stage.seconds / STEPS, guards=[Recorded(policy)]
-        )
+        movement = simulate(step, starts, STEPS, LASTS * stage.seconds / STEPS, guards=[Recorded(policy)])
     P = stage.places(movement.states)
     first = np.flatnonzero(movement.episodes[1:] == movement.episodes[:-1])
     return np.stack([P[first], P[first + 1]], axis=1), movement.states[first]

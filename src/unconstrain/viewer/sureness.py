@@ -1,10 +1,16 @@
 """How sure a policy is at a state: near 1 where it is known, near 0 where nothing was recorded."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.errors import PolicyError
+from unconstrain.demonstrations import Demonstrations
+from unconstrain.diagnostics import identifiability
+from unconstrain.errors import UnconstrainError
+from unconstrain.motion import root_mean_square
 from unconstrain.policies.base import Policy
+from unconstrain.policies.linear import LinearPolicy
 
 Array = NDArray[np.float64]
 
@@ -24,21 +30,34 @@ class Sureness:
     ----------
     policy : Policy
         Fitted.
+    demos : Demonstrations, optional
+        Recordings, by which it is known how sure a policy is whose file does not tell.
+
+    Attributes
+    ----------
+    why_not : str
+        Why only the distance counts, if so.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy, demos: Demonstrations | None = None) -> None:
         self.policy = policy
-        self.why_not = ""
-        self.beyond = policy.usual_distance()
-        self.scale = policy.scale_
+        self.beyond, self.scale = policy.usual_distance(), policy.scale_
+        self.speed, self.why_not = 1.0, ""
+        self._covariance: Callable[[Array], Array] = policy.covariance
         try:
             self._covariance = policy.prepare_covariance()
-            self._covariance(np.zeros((0, policy.n_features_in_)))
-        except PolicyError as error:
+            self._covariance(policy.space_.origin[None])  # some find out only then that they cannot tell
+        except UnconstrainError as error:
             self.why_not = str(error)
-        except ValueError:  # of no states there is none to compute
-            pass
-        self.speed = policy.usual_speed()
+        if self.why_not and isinstance(policy, LinearPolicy) and demos is not None:
+            try:
+                self._covariance, self.why_not = identifiability(policy, demos).covariance, ""
+            except UnconstrainError as error:
+                self.why_not = str(error)
+        if not self.why_not:
+            self.speed = (
+                policy.usual_speed() if demos is None else root_mean_square(policy.scaled(demos.actions))
+            )
 
     def __call__(self, X: Array) -> Array:
         """Say how sure the policy is.

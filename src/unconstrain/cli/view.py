@@ -1,0 +1,130 @@
+"""`unconstrain view`: a policy and its recordings in the browser."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from unconstrain.cli import constraining, recordings, reporting, trusting
+from unconstrain.cli.command import command, in_words_of_program
+from unconstrain.cli.declared import option
+from unconstrain.progress import working
+
+if TYPE_CHECKING:
+    from unconstrain.viewer import Page
+
+SECTION = "Page"
+HOST, PORT = "127.0.0.1", 8080
+"""Those of `viewer.server`, which is not imported before it is needed."""
+
+
+@command(
+    short_help="Look at a policy and its recordings in the browser.",
+    epilog="For example:\n\n\b\nunconstrain view wipe.skops wipe.csv",
+)
+@click.argument("policy", type=click.Path(path_type=Path))
+@recordings.recorded
+@constraining.constraint
+@option(
+    "--shown",
+    metavar="COLUMNS",
+    help='Which two or three states are shown first, by name: "x,z". By default the first three.',
+    section=SECTION,
+)
+@option(
+    "--robot",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The robot (MJCF or URDF) whose joints the states are: its hand is shown.",
+    section=SECTION,
+)
+@option(
+    "--site", metavar="FRAME", help="Which frame of the robot is shown; by default its last.", section=SECTION
+)
+@option(
+    "--lock",
+    multiple=True,
+    metavar="JOINT",
+    help="A joint of the robot that holds still, at 0. May be given several times.",
+    section=SECTION,
+)
+@option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    metavar="NUMBER",
+    default=PORT,
+    show_default=True,
+    help="The port of the page; 0 for any that is free.",
+    section=SECTION,
+)
+@option(
+    "--host",
+    default=HOST,
+    show_default=True,
+    metavar="ADDRESS",
+    help="Where the page can be opened: on this computer only, or with 0.0.0.0 by all that reach it.",
+    section=SECTION,
+)
+@trusting.trusted
+def view(
+    policy: Path,
+    recorded: recordings.Recorded,
+    constraint: Path | None,
+    shown: str | None,
+    robot: Path | None,
+    site: str | None,
+    lock: tuple[str, ...],
+    port: int,
+    host: str,
+    trusted: tuple[str, ...],
+) -> None:
+    """Look at a policy in the browser, and drag the start of a rollout.
+
+    POLICY was saved by `unconstrain fit`, and FILES are read as those it was learnt from, unless an option says
+    otherwise. The page is served until Ctrl-C is pressed.
+    """
+    from unconstrain.viewer import server
+    from unconstrain.viewer import view as open_page
+
+    server.check_port(host, port)  # before minutes of reading
+    learnt = trusting.load(policy, trusted)
+    with working("reading"):
+        recorded = recorded.like(getattr(learnt, "recording_", None))
+        demos = constraining.tell(recorded.load(), constraint)
+    recordings.describe(demos)
+    recorded.check_names(learnt, demos)
+    with working("drawing"):
+        page = open_page(
+            learnt,
+            demos,
+            coordinates=None if shown is None else _positions(shown, demos.state_names),
+            robot=robot,
+            site=site,
+            lock=lock,
+            host=host,
+            port=port,
+        )
+    for note in page.notes:
+        reporting.say(f"note: {in_words_of_program(note)}")
+    _say_where(page, host)
+    page.wait()
+
+
+def _positions(text: str, names: tuple[str, ...]) -> list[int]:
+    from unconstrain.errors import DataError
+
+    wanted = [name.strip() for name in text.split(",")]
+    unknown = [name for name in wanted if name not in names]
+    if unknown:
+        raise DataError(f"there is no state {', '.join(unknown)} for shown=: there are {', '.join(names)}")
+    return [names.index(name) for name in wanted]
+
+
+def _say_where(page: "Page", host: str) -> None:
+    port = page.stage.server.get_port()
+    reporting.say(f"page: {page.url}")
+    if host == HOST:
+        reporting.say(
+            f"from another computer: ssh -L {port}:localhost:{port} this-computer, then open http://localhost:{port}"
+        )
+    reporting.say("Ctrl-C ends it")

@@ -1,5 +1,6 @@
 """What a file of Rerun's holds: movements, fields, a rollout, and the numbers over time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,7 +51,7 @@ class Room:
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def around(cls, demos: Demonstrations, coordinates: tuple[int, ...] | None) -> "Room":
+    def around(cls, demos: Demonstrations, coordinates: Sequence[int] | None) -> "Room":
         """Make the room of recordings, with the coordinates given or the first three."""
         n = demos.states.shape[1]
         axes = tuple(range(min(n, 3))) if coordinates is None else tuple(coordinates)

@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -29,7 +30,7 @@ def log_rerun(
     path: str | os.PathLike[str],
     *,
     rollout: Demonstrations | None = None,
-    coordinates: tuple[int, ...] | None = None,
+    coordinates: Sequence[int] | None = None,
     overwrite: bool = False,
 ) -> tuple[str, ...]:
     """Write recordings, the learnt field and a rollout for Rerun's viewer: ``rerun FILE.rrd`` opens it.
@@ -48,7 +49,7 @@ def log_rerun(
     rollout : Demonstrations, optional
         A movement that `policy.rollout` returned. By default the policy is followed from where the first recording
         starts, for as long as that recording took.
-    coordinates : tuple of int, optional
+    coordinates : sequence of int, optional
         Which of the states are drawn in space, at most three, counted from 0; by default the first three.
     overwrite : bool
         Whether a file that exists is replaced.

@@ -141,7 +141,7 @@ class GraspPage:
         """End the loop and the server."""
         if not self._closed.is_set():
             self._closed.set()
-            self.server.stop()
+            server.stop(self.server)
 
     def _begin_anew(self) -> None:
         self._restart.clear()
@@ -167,8 +167,8 @@ class GraspPage:
         camera.position = (x + 1.65, y + 0.75, z + 0.75)
         camera.fov = 0.75
         scene.set_background_image(_sky(), format="png")
-        scene.add_light_ambient("/light/everywhere", intensity=1.1)
-        scene.add_light_directional("/light/front", intensity=1.5, position=(1.2, 1.6, 3.0))
+        scene.add_light_ambient("/light/everywhere", intensity=1.7)
+        scene.add_light_directional("/light/front", intensity=2.0, position=(1.2, 1.6, 3.0))
 
 
 def _sky() -> NDArray[np.uint8]:

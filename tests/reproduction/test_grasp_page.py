@@ -17,7 +17,7 @@ from playwright.sync_api import sync_playwright  # noqa: E402
 
 from reproduction.grasp.interaction import NOTHING  # noqa: E402
 from reproduction.grasp.page import GraspPage  # noqa: E402
-from reproduction.grasp.trial import make_demonstrator  # noqa: E402
+from reproduction.grasp.trial import learn, make_demonstrator, record_training  # noqa: E402
 from reproduction.plants.robot_choice import OUR_OWN  # noqa: E402
 
 CHROMIUM = shutil.which("chromium")
@@ -29,7 +29,9 @@ SHOTS = Path(__file__).parents[2] / "out" / "screenshots"
 @pytest.fixture
 def grasp():
     demonstrator = make_demonstrator(OUR_OWN)
-    page = GraspPage(demonstrator, {"true policy": demonstrator.policy, "still": lambda X: 0 * X}, port=0)
+    recording, _ = record_training(demonstrator, 0, n=40, duration=1.0)
+    learnt, _ = learn(recording.demonstrations, "inconsistency")
+    page = GraspPage(demonstrator, {"learnt": learnt, "true policy": demonstrator.policy}, port=0)
     loop = threading.Thread(target=page.run, daemon=True)
     loop.start()
     yield page
@@ -72,7 +74,7 @@ def pixel(camera, point, width, height):
 
 
 def test_the_page_in_a_browser(grasp, browser):
-    width, height = 900, 600
+    width, height = 1000, 640
     page = browser.new_page(viewport={"width": width, "height": height})
     errors, requests = [], []
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
@@ -115,6 +117,13 @@ def test_the_page_in_a_browser(grasp, browser):
     assert wait_for(lambda: grasp.interaction.in_the_way.aside < 0.07), "the handle is dragged to the right"
     assert grasp.interaction.in_the_way.aside == pytest.approx(0.0, abs=0.03)
 
+    page.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach(each => each.click())")
+    grasp.change(width=0.3, aside=0.1)
+    grasp.restart()
+    assert wait_for(lambda: grasp.interaction.seconds == 0)
+    grasp.is_paused = False
+    assert wait_for(lambda: grasp.interaction.seconds > 1.4)
+    grasp.is_paused = True
     SHOTS.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=SHOTS / "grasp_page.png")
     grasp.change(kind=NOTHING)

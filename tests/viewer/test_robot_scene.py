@@ -109,3 +109,22 @@ def test_a_real_arm_by_urdf(served, monkeypatch):
         drawn = arrived[f"/robot/{model.geom_bodyid[geom]}/0"]
         # Vertices on sharp edges are there once for each side.
         np.testing.assert_array_equal(np.unique(drawn.round(5), axis=0), np.unique(expected.round(5), axis=0))
+
+
+def test_in_uc_view_the_robot_follows_the_time_line():
+    robot = Robot(mujoco.MjSpec.from_string(ARM))
+    t = np.linspace(0, 2, 41)
+    X = np.stack([np.sin(t), 0.5 * np.cos(t)], axis=1)
+    U = np.stack([np.cos(t), -0.5 * np.sin(t)], axis=1)
+    demos = uc.Demonstrations(X, U, time=t, state_names=robot.joints)
+    policy = uc.ParametricPolicy(uc.NormalizedRBF(n_centers=9), risk="direct").fit(demos)
+    page = uc.view(policy, demos, robot=robot, site="fore", port=0)
+    try:
+        assert page.settle()
+        page.timeline.go_to(1.0)
+        movement = page.stage.movement
+        state = movement.states[[np.searchsorted(movement.time, 1.0 - 1e-9)]]
+        fore = page.stage.server.scene._handle_from_node_name["/robot/2"]
+        np.testing.assert_allclose(fore.position, robot.pose(state, "fore")[0][0], atol=1e-6)
+    finally:
+        page.close()

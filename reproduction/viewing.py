@@ -1,5 +1,6 @@
 """The program's command `view`: an experiment in the browser, to stand in its way."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -119,15 +120,18 @@ def cycle(movements: int, risk: str, port: int, host: str) -> None:
     from unconstrain.demo import draw_data, make_policy
     from unconstrain.viewer import server
     from unconstrain.viewer import view as open_page
+    from unconstrain.viewer.obstacles import PLANE
 
     console = make_console()
     server.check_port(host, port)
     training, _ = draw_data(0)
-    training = training.select(training.episodes < movements)
+    # What is known of simulated movements, their constraints, is not told.
+    training = replace(training.select(training.episodes < movements), projections=None, policy=None)
     with console.status("learning"):
         page = open_page(make_policy(risk).fit(training), training, host=host, port=port)
+    page.controls.seconds.max = 2 * PERIOD
     page.controls.seconds.value = PERIOD
-    page.controls.obstacles.value = "a plane"
+    page.controls.obstacles.value = PLANE
     for note in page.notes:
         console.print(f"note: {note}", soft_wrap=True)
     _say_where(console, page.url, host)

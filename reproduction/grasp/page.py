@@ -123,7 +123,7 @@ class GraspPage:
                 self._begin_anew()
                 rested, due = 0.0, time.monotonic()
             if self.is_paused:
-                due = now + 1 / FREQUENCY
+                due, counted, steps = now + 1 / FREQUENCY, now, 0
             elif now >= due:
                 rested = rested + 1 / FREQUENCY if self.interaction.step() < REST else 0.0
                 self.ways.go(self.interaction.body.hands)

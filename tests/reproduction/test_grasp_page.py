@@ -13,12 +13,12 @@ pytest.importorskip("mink")
 pytest.importorskip("viser")
 pytest.importorskip("playwright")
 
-from playwright.sync_api import sync_playwright  # noqa: E402
+from playwright.sync_api import sync_playwright
 
-from reproduction.grasp.interaction import NOTHING  # noqa: E402
-from reproduction.grasp.page import GraspPage  # noqa: E402
-from reproduction.grasp.trial import learn, make_demonstrator, record_training  # noqa: E402
-from reproduction.plants.robot_choice import OUR_OWN  # noqa: E402
+from reproduction.grasp.interaction import NOTHING
+from reproduction.grasp.page import GraspPage
+from reproduction.grasp.trial import learn, make_demonstrator, record_training
+from reproduction.plants.robot_choice import OUR_OWN
 
 CHROMIUM = shutil.which("chromium")
 QUIET = ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]
@@ -107,8 +107,8 @@ def test_the_page_in_a_browser(grasp, browser):
 
     camera = next(iter(grasp.server.get_clients().values())).camera
     handle = np.array(grasp.barrier.handles["aside"].position)
-    x, y = pixel(camera, handle + [0, 0.06, 0], width, height)
-    to_x, to_y = pixel(camera, handle + [0, -0.04, 0], width, height)
+    x, y = pixel(camera, handle + np.array([0, 0.06, 0]), width, height)
+    to_x, to_y = pixel(camera, handle + np.array([0, -0.04, 0]), width, height)
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move((x + to_x) / 2, (y + to_y) / 2)
@@ -117,7 +117,9 @@ def test_the_page_in_a_browser(grasp, browser):
     assert wait_for(lambda: grasp.interaction.in_the_way.aside < 0.07), "the handle is dragged to the right"
     assert grasp.interaction.in_the_way.aside == pytest.approx(0.0, abs=0.03)
 
-    page.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach(each => each.click())")
+    page.evaluate(
+        "document.querySelectorAll('.mantine-Notification-closeButton').forEach(each => each.click())"
+    )
     grasp.change(width=0.3, aside=0.1)
     grasp.restart()
     assert wait_for(lambda: grasp.interaction.seconds == 0)

@@ -14,12 +14,6 @@ Array = NDArray[np.float64]
 STILL = 1e-6
 """A body that moved and turned by less (metres, quaternion) is not sent to the browser again."""
 
-TOO_FINE = 60_000
-"""Faces of one shape over which its edges are not looked at: that would take seconds."""
-
-SHARP = 0.7
-"""Angle between faces, in radians, from which their common edge is drawn sharp."""
-
 
 class RobotScene:
     """A robot, and whatever its model has around it, in the scene of a viser server.
@@ -60,13 +54,10 @@ class RobotScene:
                 node = f"{name}/{body}"
                 self.bodies[body] = server.scene.add_frame(node, show_axes=False)
                 for k, shape in enumerate(parts):
-                    vertices, faces = shape.vertices, shape.faces
-                    if not shape.is_flat and len(faces) <= TOO_FINE:
-                        vertices, faces = _split_sharp_edges(vertices, faces)
                     server.scene.add_mesh_simple(
                         f"{node}/{k}",
-                        vertices,
-                        faces,
+                        shape.vertices,
+                        shape.faces,
                         color=shape.rgba[:3],
                         opacity=None if shape.rgba[3] >= 1 else shape.rgba[3],
                         flat_shading=shape.is_flat,
@@ -104,12 +95,3 @@ class RobotScene:
                 if body in self.bodies:
                     self.bodies[body].position, self.bodies[body].wxyz = poses[body, :3], poses[body, 3:]
         self._sent = np.where(moved[:, None], poses, self._sent)
-
-
-def _split_sharp_edges(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-    """Give faces on either side of a sharp edge vertices of their own, so that the edge is seen."""
-    import trimesh  # slow to import
-
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    parts = trimesh.graph.smooth_shade(mesh, angle=SHARP)
-    return np.asarray(parts.vertices), np.asarray(parts.faces, dtype=np.int64)

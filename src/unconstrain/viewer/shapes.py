@@ -21,6 +21,12 @@ PLAIN = (0.5, 0.5, 0.5, 1.0)
 SIDES = 24
 """Of cylinders and capsules."""
 
+TOO_FINE = 60_000
+"""Faces of one shape over which its edges are not looked at: that would take seconds."""
+
+SHARP = 0.7
+"""Angle between faces, in radians, from which their common edge is drawn sharp."""
+
 PLANE_SIDE = 4.0
 """Half a side of a plane that is endless, in metres."""
 
@@ -32,7 +38,7 @@ class Shape:
     Parameters
     ----------
     vertices : ndarray of shape (V, 3)
-        In the body's frame, in metres.
+        In the body's frame, in metres. Those of meshes on sharp edges are there once for each side.
     faces : ndarray of shape (F, 3), int
         Triangles.
     rgba : tuple of float
@@ -141,7 +147,7 @@ def _triangulate(model: Any, geom: int) -> tuple[Array, NDArray[np.int64], bool]
                 (model.mesh_face, model.mesh_faceadr[mesh], model.mesh_facenum[mesh], np.int64),
             )
         )
-        return vertices, faces, False
+        return *_split_sharp_edges(vertices, faces), False
     if kind == kinds.mjGEOM_BOX:
         made = trimesh.creation.box(2 * size)
     elif kind == kinds.mjGEOM_PLANE:
@@ -160,6 +166,17 @@ def _triangulate(model: Any, geom: int) -> tuple[Array, NDArray[np.int64], bool]
         return None
     flat = kind in (kinds.mjGEOM_BOX, kinds.mjGEOM_PLANE, kinds.mjGEOM_CYLINDER)
     return np.asarray(made.vertices), np.asarray(made.faces, dtype=np.int64), flat
+
+
+def _split_sharp_edges(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+    """Give faces on either side of a sharp edge vertices of their own, so that the edge is seen."""
+    import trimesh  # slow to import
+
+    if len(faces) > TOO_FINE:
+        return vertices, faces
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    parts = trimesh.graph.smooth_shade(mesh, angle=SHARP)
+    return np.asarray(parts.vertices), np.asarray(parts.faces, dtype=np.int64)
 
 
 def _join(parts: list[tuple[Array, NDArray[np.int64]]]) -> tuple[Array, NDArray[np.int64]]:

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 MOST_EPISODES, MOST_SAMPLES = 200, 200_000
 """More recordings, and more samples, are thinned evenly: a viewer has to stay fluent."""
 
+JUMP = 0.5
+"""Of the room's size: samples farther apart are not joined, such as those where an angle begins anew."""
+
 ALONG = {1: 40, 2: 24, 3: 11}
 """Places along each dimension of the grid on which a field is drawn."""
 
@@ -101,8 +104,9 @@ def log_movements(stream: Any, policy: Policy, demos: Demonstrations, room: Room
         path, at = f"demonstrations/paths/{name}", f"demonstrations/now/{name}"
         # A line has one colour: a piece from each sample to the next has that of the first.
         pieces = np.stack([points[kept[:-1]], points[kept[1:]]], axis=1)
+        near = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1) < JUMP * room.size
         line = rr.LineStrips3D(
-            pieces.astype(np.float32), colors=colors[kept[:-1]], radii=rr.Radius.ui_points(1.5)
+            pieces[near].astype(np.float32), colors=colors[kept[:-1]][near], radii=rr.Radius.ui_points(1.5)
         )
         stream.log(path, line, static=True, strict=True)
         stream.log(at, rr.Points3D.from_fields(radii=rr.Radius.ui_points(5.0)), static=True, strict=True)
@@ -158,8 +162,8 @@ def log_field(stream: Any, policy: Policy, demos: Demonstrations, room: Room) ->
     return notes
 
 
-def log_rollout(stream: Any, movement: Demonstrations, room: Room) -> None:
-    """Log a rollout: its paths, a point that moves along each, and its numbers over time."""
+def log_rollout(stream: Any, movement: Demonstrations, demos: Demonstrations, room: Room) -> None:
+    """Log a rollout: its paths, a point that moves along each, and its numbers, named as the recordings'."""
     import rerun as rr
 
     points = room.place(movement.states)
@@ -178,8 +182,8 @@ def log_rollout(stream: Any, movement: Demonstrations, room: Room) -> None:
         indexes = [rr.TimeColumn("time", duration=movement.time[own])]
         stream.send_columns(at, indexes, rr.Points3D.columns(positions=points[own]), strict=True)
         for kind, values, names in (
-            ("states", movement.states, movement.state_names),
-            ("actions", movement.actions, movement.action_names),
+            ("states", movement.states, demos.state_names),
+            ("actions", movement.actions, demos.action_names),
         ):
             _log_series(
                 stream, f"{kind}/rollout/{name}", indexes, values[own], [f"rollout {each}" for each in names]

@@ -62,8 +62,8 @@ def log_rerun(
     Raises
     ------
     DataError
-        The name of the file is not right, the file exists, the coordinates are not states, or the recordings do not go
-        with the policy.
+        The name of the file is not right, the file exists, the coordinates are not states, or the recordings or the
+        rollout do not go with the policy.
     PolicyError
         It is no policy of this library.
     UnconstrainError
@@ -91,6 +91,8 @@ def log_rerun(
             f"these recordings have {given[0]} states and {given[1]} actions, and the policy {wanted[0]} and "
             f"{wanted[1]}: give those it was learnt from, or others like them"
         )
+    if rollout is not None and (rollout.states.shape[1], rollout.actions.shape[1]) != wanted:
+        raise DataError(f"rollout= has other states or actions than the policy, {wanted[0]} and {wanted[1]}")
     room = Room.around(demos, coordinates)
     notes = list(room.notes)
     if rollout is None:
@@ -105,7 +107,7 @@ def log_rerun(
         notes += log_movements(stream, policy, demos, room)
         notes += log_field(stream, policy, demos, room)
         if rollout is not None:
-            log_rollout(stream, rollout, room)
+            log_rollout(stream, rollout, demos, room)
         lines = "\n".join(f"- {note}" for note in notes) or "- Nothing was left out."
         text = rr.TextDocument(f"# unconstrain\n\n{lines}\n", media_type=rr.MediaType.MARKDOWN)
         stream.log("notes", text, static=True, strict=True)
@@ -149,14 +151,16 @@ def _follow(policy: Policy, demos: Demonstrations) -> tuple[Movement | None, lis
     """Follow the policy from where the first recording starts, for as long as it took, and say what is to be said."""
     first = demos.episode(0)
     if first.time is None or len(first) < 2:
-        return None, ["There is no rollout: the first recording has no time, so give one with rollout=."]
+        return None, [
+            "There is no rollout: the first recording has no times to follow it for, so give one with rollout=."
+        ]
     dt = float(np.median(np.diff(first.time)))
     steps = min(len(first) - 1, MOST_STEPS)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MovementStopped)  # which the notes say
             movement = integrate(policy, first.states[0], steps, dt)
-    except (DataError, PolicyError) as error:
+    except UnconstrainError as error:
         return None, [f"There is no rollout: {error}."]
     label = demos.episode_labels[0]
     said = [f"The rollout starts where recording {label} does and takes {steps} steps of {dt:g} s."]

@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-torch fuzz bench reproduce format clean
+.PHONY: demo test test-torch docs fuzz bench reproduce format clean
 
 demo: $(VENV)/.demo
 	$(BIN)/unconstrain demo --out out/demo --overwrite
@@ -22,6 +22,14 @@ TORCH ?= torch==2.13.0
 test-torch: $(VENV)/.torch
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest tests/torch tests/policies/test_torch_policy.py \
 		"tests/test_examples.py::test_the_example_runs[deep_net]"
+
+# The site, out/site/index.html: runs every example, and reads the result in a browser (Debian's package chromium).
+# GALLERY=no leaves the examples unrun.
+docs: $(VENV)/.docs
+	rm -rf docs/api/generated out/site
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/sphinx-build --fail-on-warning --keep-going \
+		--doctree-dir out/doctrees docs out/site
+	$(BIN)/pytest tests/site
 
 # Any number of inputs that nobody meant to give; those that fail are kept in out/fuzz.
 N ?= 1000
@@ -43,7 +51,7 @@ format: $(VENV)/.test
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) out
+	rm -rf $(VENV) out docs/api/generated docs/gallery
 
 $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
@@ -58,4 +66,8 @@ $(VENV)/.test: pyproject.toml | $(BIN)/python
 
 $(VENV)/.torch: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet $(TORCH)
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.torch
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
 	@touch $@

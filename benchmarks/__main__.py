@@ -21,7 +21,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, models, start, step, stream
+from benchmarks import fits, identifiability, models, start, step, stream, viewer
 from benchmarks.ratio import Ratio
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
@@ -42,6 +42,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-local-memory": stream.local_memory,
     **step.BENCHMARKS,
     **start.BENCHMARKS,
+    **viewer.BENCHMARKS,
 }
 
 TABLES: dict[str, Callable[[], None]] = {"models": models.print_tables}

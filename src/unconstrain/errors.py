@@ -5,6 +5,16 @@ which the command line turns into ``--name``. The command line prints the senten
 of them are `ValueError`, as scikit-learn expects of bad input.
 """
 
+__all__ = [
+    "ArchiveError",
+    "DataError",
+    "NotNumbersError",
+    "PolicyError",
+    "RobotError",
+    "UnconstrainError",
+    "UntrustedArchiveError",
+]
+
 
 def printable(text: str) -> str:
     r"""Spell out the control characters of a text, of which terminals would make something.

@@ -9,7 +9,10 @@ hand.py         the place of a robot's hand instead, by forward kinematics
 frame.py        from what is shown to places in the scene
 samples.py      which samples are shown, and how surely each was free
 movements.py, arrows.py, streams.py, diagnosis.py, obstacles.py, start.py, path.py   what is drawn, a part each
+camera.py      where it is looked at from
 surroundings.py grid, ticks and names of the axes
+palette.py      what the colours stand for
+legend.py       what the page says in words
 sureness.py     how sure the policy is: from 0, where nothing was recorded, to 1
 following.py    the rollout from a start
 barriers.py     a plane and a box as constraints of the rollout

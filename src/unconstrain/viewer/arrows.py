@@ -1,35 +1,13 @@
-"""Arrows: their shape, their lengths, and the field they are drawn for."""
+"""Arrows: their shape, and how they are turned."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LONGEST = 0.9
-"""Share of actions that are drawn in proportion; longer ones are drawn as long as the longest of these."""
-LEAST = 0.15
-"""Of the longest arrow: shorter ones would show no direction."""
 SIDES = 8
 SHAFT, HEAD, HEAD_BEGINS = 0.035, 0.11, 0.62
 """Radii of an arrow of length one, and where its head begins."""
-
-
-def arrow_lengths(U: Array) -> Array:
-    """Choose how long arrows are drawn, so that one fast stretch does not make all others vanish.
-
-    Parameters
-    ----------
-    U : ndarray of shape (N, k)
-        Vectors.
-
-    Returns
-    -------
-    ndarray of shape (N,)
-        From 0 to 1.
-    """
-    lengths = np.linalg.norm(U, axis=1)
-    usual = float(np.quantile(lengths[lengths > 0], LONGEST)) if (lengths > 0).any() else 1.0
-    return np.where(lengths > 0, np.clip(lengths / usual, LEAST, 1.0), 0.0)
 
 
 def shape() -> tuple[Array, NDArray[np.uint32]]:

@@ -50,7 +50,7 @@ class Plane:
         """Return the normal where a step leads behind the plane; see `Barrier.normals`."""
         speed = steps @ self.normal
         into = (speed < 0) & ((P - self.point) @ self.normal + speed < 0)
-        return np.where(into[:, None], self.normal, 0.0)
+        return into[:, None] * self.normal
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,11 @@ class Box:
 
     def normals(self, P: Array, steps: Array) -> Array:
         """Return the normal of the face that a step leads through; see `Barrier.normals`."""
-        rows = np.arange(len(P))
         half, before = self.sides / 2.0, P - self.centre
+        after = before + steps
+        if ((np.minimum(before, after) >= half) | (np.maximum(before, after) <= -half)).any(axis=1).all():
+            return np.zeros_like(P)  # beside it, as nearly always
+        rows = np.arange(len(P))
         outside = np.abs(before) - half
         # A fast step may lead through the box: it enters where the last of the axes comes within its face.
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -136,11 +139,13 @@ class InTheWay:
             Rows A with A u = 0, zero where nothing is in the way.
         """
         A = np.zeros((len(X), 0, U.shape[1])) if known is None else known
+        if not self.barriers:
+            return A
         P = self.frame.to_scene(self.coordinates.place(X))
         J = self.coordinates.tangents(X)
         for _ in range(ROUNDS):
             left = constrain(projection(A), U, self.scale) if A.shape[1] else U
-            steps = self.frame.vectors(self.dt * np.einsum("skd,sd->sk", J, left))
+            steps = self.frame.vectors(self.dt * (J @ left[:, :, None])[:, :, 0])
             found = [each.normals(P, steps) for each in self.barriers]
             found = [normals for normals in found if normals.any()]
             if not found:

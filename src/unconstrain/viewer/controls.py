@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from unconstrain.spaces import SecondOrder
 from unconstrain.viewer import exporting, field, legend, obstacles
 from unconstrain.viewer.coordinates import Picked
 
@@ -87,6 +88,8 @@ class Controls:
             self.obstacles = gui.add_dropdown(
                 "In its way", (obstacles.NOTHING, obstacles.PLANE, obstacles.BOX, obstacles.BOTH)
             )
+            # A barrier takes away velocity, and the actions of these are accelerations.
+            self.obstacles.visible = not isinstance(page.stage.policy.space_, SecondOrder)
             self.obstacles.on_update(lambda event: page.put_in_the_way(self.obstacles.value))
             side = page.obstacles.side_in_units(page.stage)
             self.side = gui.add_slider("Box side", *_range(side), side, visible=False)

@@ -120,16 +120,17 @@ class Picked:
                 f"coordinates= are two or three different ones of {', '.join(axes.names)}, counted from 0"
             )
         self.names = tuple(axes.names[each] for each in self.which)
-        self._identity = np.eye(axes.space.n_actions)[self.which]
+        self._is_flat = axes.space.is_flat
+        self._identity = np.eye(axes.space.n_actions)[None, self.which]
 
     def place(self, X: Array) -> Array:
         """Return the shown numbers; see `Coordinates.place`."""
-        return self.axes.values(X)[:, self.which]
+        return X[:, self.which] if self._is_flat else self.axes.values(X)[:, self.which]
 
     def tangents(self, X: Array) -> Array:
         """Return how actions move them; see `Coordinates.tangents`."""
-        if self.axes.space.is_flat or isinstance(self.axes.space, SecondOrder):
-            return np.broadcast_to(self._identity, (len(X), *self._identity.shape))
+        if self._is_flat or isinstance(self.axes.space, SecondOrder):
+            return self._identity if len(X) == 1 else np.repeat(self._identity, len(X), axis=0)
         return finite_differences(self, self.axes.space, X)
 
     def put(self, x: Array, place: Array) -> Array:

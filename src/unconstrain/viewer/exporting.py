@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.plot.arrows import scale_arrows
 from unconstrain.recordings.text import write_csv
 from unconstrain.stopping import Movement
-from unconstrain.viewer import arrows, field, palette
+from unconstrain.viewer import field, palette
 from unconstrain.viewer.following import is_held
 from unconstrain.viewer.stage import DIRECT, Stage
 from unconstrain.viewer.sureness import Sureness
@@ -86,11 +87,9 @@ def svg(stage: Stage, sureness: Sureness) -> bytes:
     X, longest = field.stand(stage)
     U = stage.policy.predict(X).reshape(len(X), -1)
     P, V = stage.coordinates.place(X), np.einsum("nkd,nd->nk", stage.coordinates.tangents(X), U)
-    lengths = longest / stage.frame.scale * arrows.arrow_lengths(V)
-    unit = V / np.maximum(np.linalg.norm(V, axis=1, keepdims=True), 1e-300)
     colour = palette.DIRECT if stage.name == DIRECT else palette.LEARNT
     shades = np.column_stack([np.tile(np.array(palette.rgb(colour)) / 255.0, (len(X), 1)), sureness(X)])
-    arrow = lengths[:, None] * unit
+    arrow = longest / stage.frame.scale * scale_arrows(V)
     if flat:
         ax.quiver(*P.T, *arrow.T, angles="xy", scale_units="xy", scale=1.0, color=shades, width=0.0035)
         ax.set_aspect("equal", adjustable="datalim")

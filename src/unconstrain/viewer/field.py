@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.features.centers import farthest_first
+from unconstrain.motion import lengths
+from unconstrain.plot.arrows import scale_arrows
 from unconstrain.spaces import SecondOrder
 from unconstrain.viewer import arrows, palette, streams
 from unconstrain.viewer.stage import DIRECT, Stage
@@ -68,7 +70,7 @@ class Field:
             faces,
             batched_wxyzs=arrows.turns(V),
             batched_positions=stage.places(X, lift=LIFT),
-            batched_scales=(spacing * arrows.arrow_lengths(V)).astype(np.float32),
+            batched_scales=(spacing * lengths(scale_arrows(V))).astype(np.float32),
             batched_colors=palette.linear(np.array(palette.rgb(colour))),
             batched_opacities=self.sureness(stage)(X),
             lod="off",

@@ -19,7 +19,7 @@ from unconstrain.viewer.frame import Frame
 
 Array = NDArray[np.float64]
 
-STEPS = 200
+STEPS = 150
 """Of a rollout: as many as can be followed while a start is dragged, and a smooth line."""
 
 
@@ -115,11 +115,13 @@ class Follower:
             something may be in the way.
         """
         dt = wanted.seconds / STEPS
+        free = np.eye(self.policy.n_actions_)[None]
         in_the_way = InTheWay(wanted.barriers, coordinates, frame, dt, self.policy.scale_)
 
         def project(sample: int, X: Array, U: Array) -> Array:
             known = None if wanted.under is None else wanted.under(X)
-            return projection(in_the_way.rows(X, U, known))
+            A = in_the_way.rows(X, U, known)
+            return projection(A) if A.shape[1] else free
 
         policy: Any = self.policy if self._step is None else self._step
         constrained = bool(wanted.barriers) or wanted.under is not None

@@ -108,7 +108,7 @@ def view(
         policies[DIRECT] = other
     if isinstance(policy.space_, SecondOrder):
         notes.append(
-            "actions are accelerations, so there are no arrows over places; rollouts begin as recorded ones do"
+            "actions are accelerations, so there are no arrows over places, and nothing can be put in a rollout's way"
         )
     served = server.start(host, port)
     stage = Stage(
@@ -170,6 +170,8 @@ def _hand(
     hand = Hand(loaded, chosen, policy.space_, names)
     if site is None:
         notes.append(f"the robot's last frame, {chosen}, is taken for its hand; name another with site=")
+    elif len(loaded.frames) > 1:
+        notes.append(f"the place of {chosen} is shown")
     if not hand.by_name:
         pairs = ", ".join(f"{name} is {joint}" for name, joint in zip(names, loaded.joints, strict=False))
         notes.append(f"states are taken for the joints in their order, so {pairs}")

@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.stopping import Movement
-from unconstrain.viewer import exporting, legend, server
+from unconstrain.viewer import camera, exporting, legend, server
 from unconstrain.viewer.controls import Controls
 from unconstrain.viewer.coordinates import Picked
 from unconstrain.viewer.diagnosis import Diagnosis
@@ -67,7 +66,7 @@ class Page:
         self.timeline = Timeline(self._at_time)
         self.controls = Controls(self)
         stage.listeners += [self.path.update, self._tell_rollout, self.timeline.set_movement]
-        self._look(stage)
+        camera.look(stage)
         self.redraw()
         self.follow()
 
@@ -178,7 +177,7 @@ class Page:
         for k, slider in enumerate(self.controls.others):
             slider.visible = k not in which
         self.controls.show_side(self.obstacles.side_in_units(stage))
-        self._look(stage)
+        camera.look(stage)
         self.redraw()
         self.follow()
 
@@ -286,21 +285,3 @@ class Page:
 
     def _fail(self, error: Exception) -> None:
         self.say(str(error))
-
-    def _look(self, stage: Stage) -> None:
-        """Put the camera where all of the scene is seen, from above what is flat."""
-        served, frame = stage.server, stage.frame
-        middle, reach = frame.middle, frame.extent
-        flat = frame.is_flat
-        served.scene.set_up_direction("+y" if flat else "+z")
-        away = np.array([0.0, 0.0, 1.95]) if flat else np.array([1.2, -1.6, 1.0])
-        aside = np.array([0.22, 0.0, 0.0]) if flat else np.array([0.12, 0.09, 0.0])
-        camera: Any = served.initial_camera
-        camera.fov = 0.7
-        camera.up = (0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0)
-        camera.look_at = tuple(middle + reach * aside)
-        camera.position = tuple(middle + reach * (aside + away))
-        for client in served.get_clients().values():
-            client.camera.up_direction = camera.up
-            client.camera.position = camera.position
-            client.camera.look_at = camera.look_at

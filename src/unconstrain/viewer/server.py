@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import logging
 import socket
 from typing import Any
 
@@ -38,6 +39,8 @@ def start(host: str = HOST, port: int = PORT) -> Any:
             f"the page is shown by viser, which cannot be imported here ({error}): pip install 'unconstrain[view]'"
         ) from error
     check_port(host, port)
+    # Without a handler, Python prints a traceback for whoever opens the port and speaks no HTTP.
+    logging.getLogger("websockets.server").addHandler(logging.NullHandler())
     with contextlib.redirect_stdout(io.StringIO()):  # viser prints a panel of its own
         server = viser.ViserServer(host=host, port=port, label="unconstrain", verbose=False)
     # Colours are to be seen as they are in the legend: light from everywhere, and a little from the front for shape.

@@ -1,0 +1,1 @@
+"""The documentation as it was built: `make docs` builds it and runs these."""

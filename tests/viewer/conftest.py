@@ -1,5 +1,7 @@
 """A small policy of two states, and a page of it."""
 
+from dataclasses import replace
+
 import pytest
 
 import unconstrain as uc
@@ -8,14 +10,13 @@ from unconstrain import limit_cycle as toy
 
 @pytest.fixture(scope="session")
 def demos():
-    return toy.demonstrate(8, random_state=0)
+    """Half of it free; nobody says which."""
+    return replace(toy.demonstrate(30, noise=0.05, free=0.5, random_state=0), projections=None)
 
 
 @pytest.fixture(scope="session")
 def policy(demos):
-    return uc.LocallyLinearPolicy(n_centers=6, alpha=1e-3).fit(
-        demos.states, demos.actions, groups=demos.episodes
-    )
+    return uc.LocallyLinearPolicy(n_centers=12, alpha=1e-3).fit(demos)
 
 
 @pytest.fixture

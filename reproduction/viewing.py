@@ -129,9 +129,8 @@ def cycle(movements: int, risk: str, port: int, host: str) -> None:
     training = replace(training.select(training.episodes < movements), projections=None, policy=None)
     with console.status("learning"):
         page = open_page(make_policy(risk).fit(training), training, host=host, port=port)
-    page.controls.seconds.max = 2 * PERIOD
-    page.controls.seconds.value = PERIOD
-    page.controls.obstacles.value = PLANE
+    page.set_seconds(PERIOD)
+    page.put_in_the_way(PLANE)
     for note in page.notes:
         console.print(f"note: {note}", soft_wrap=True)
     _say_where(console, page.url, host)

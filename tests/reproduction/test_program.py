@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -157,4 +158,20 @@ def test_ctrl_c_ends_with_one_line_and_says_what_is_kept(tmp_path):
     assert process.returncode == 130
     assert "of 200 are kept in" in out
     assert err.strip().splitlines()[-1] == "interrupted: finished trials are kept"
+    assert "Traceback" not in err
+
+
+def test_the_cycle_s_page_is_served_until_ctrl_c():
+    pytest.importorskip("viser")
+    command = [sys.executable, "-m", "reproduction", "view", "cycle", "--movements", "10", "--port", "0"]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        told = next(line for line in process.stdout if line.startswith("page: "))
+        with urllib.request.urlopen(told.removeprefix("page: ").strip(), timeout=10) as page:
+            assert page.status == 200
+    finally:
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "Ctrl-C ends it" in out
     assert "Traceback" not in err

@@ -73,14 +73,15 @@ def grasp(
     host: str,
 ) -> None:
     """Let the robot grasp in real time, and drag the barrier before it."""
+    from unconstrain.viewer import server
+
+    server.check_port(host, port)  # before all that takes long
     from reproduction.grasp.page import GraspPage
     from reproduction.grasp.trial import learn, make_demonstrator, record_training
     from reproduction.plants.robot_choice import RobotChoice
     from unconstrain.policies import load_policy
-    from unconstrain.viewer import server
 
     console = make_console()
-    server.check_port(host, port)
     given = None if policy is None else load_policy(policy)
     demonstrator = make_demonstrator(RobotChoice.parse(robot, lock, hands, feet))
     with console.status(f"learning from {movements} constrained movements"):
@@ -117,13 +118,14 @@ def grasp(
 @add_options(*SERVED)
 def cycle(movements: int, risk: str, port: int, host: str) -> None:
     """Follow the policy learnt from the toy's movements round the limit cycle, and drag a wall into its way."""
-    from unconstrain.demo import draw_data, make_policy
     from unconstrain.viewer import server
+
+    server.check_port(host, port)
+    from unconstrain.demo import draw_data, make_policy
     from unconstrain.viewer import view as open_page
     from unconstrain.viewer.obstacles import PLANE
 
     console = make_console()
-    server.check_port(host, port)
     training, _ = draw_data(0)
     # What is known of simulated movements, their constraints, is not told.
     training = replace(training.select(training.episodes < movements), projections=None, policy=None)

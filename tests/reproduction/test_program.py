@@ -171,7 +171,6 @@ def test_the_cycle_s_page_is_served_until_ctrl_c():
             assert page.status == 200
     finally:
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
-    assert "Ctrl-C ends it" in out
     assert "Traceback" not in err

@@ -114,6 +114,8 @@ def test_a_mouse_drags_the_start_and_the_rollout_follows(page, browser):
 
 
 def test_boxes_dropdowns_and_numbers_do_what_they_say(page, browser):
+    page.start.drag_to(np.array([0.3, 0.75, 0.0]))
+    page.set_seconds(3.0)
     blue = colours(browser, "view")("#0072B2")
     browser.get_by_label("In its way").click()
     browser.get_by_role("option", name=PLANE, exact=True).click()

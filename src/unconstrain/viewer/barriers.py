@@ -121,8 +121,8 @@ class InTheWay:
         self.barriers, self.coordinates, self.frame = tuple(barriers), coordinates, frame
         self.dt, self.scale = dt, scale
 
-    def rows(self, X: Array, U: Array, known: Array | None = None) -> Array:
-        """Find the constraint of the next step.
+    def projections(self, X: Array, U: Array, known: Array | None = None) -> Array:
+        """Find the projections of the next step.
 
         Parameters
         ----------
@@ -135,21 +135,23 @@ class InTheWay:
 
         Returns
         -------
-        ndarray of shape (S, m, d)
-            Rows A with A u = 0, zero where nothing is in the way.
+        ndarray of shape (S, d, d)
+            The identity where nothing is in the way.
         """
         A = np.zeros((len(X), 0, U.shape[1])) if known is None else known
+        N = projection(A) if A.shape[1] else np.repeat(np.eye(U.shape[1])[None], len(X), axis=0)
         if not self.barriers:
-            return A
+            return N
         P = self.frame.to_scene(self.coordinates.place(X))
         J = self.coordinates.tangents(X)
         for _ in range(ROUNDS):
-            left = constrain(projection(A), U, self.scale) if A.shape[1] else U
+            left = constrain(N, U, self.scale) if A.shape[1] else U
             steps = self.frame.vectors(self.dt * (J @ left[:, :, None])[:, :, 0])
             found = [each.normals(P, steps) for each in self.barriers]
             found = [normals for normals in found if normals.any()]
             if not found:
                 break
             normals = np.stack(found, axis=1)[..., : J.shape[1]]
-            A = np.concatenate([A, np.einsum("smk,skd->smd", normals, J)], axis=1)
-        return A
+            A = np.concatenate([A, normals @ J], axis=1)
+            N = projection(A)
+        return N

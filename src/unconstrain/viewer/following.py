@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.constraints.nullspace import projection
 from unconstrain.errors import PolicyError
 from unconstrain.policies.base import Policy
 from unconstrain.simulation import simulate
@@ -115,13 +114,10 @@ class Follower:
             something may be in the way.
         """
         dt = wanted.seconds / STEPS
-        free = np.eye(self.policy.n_actions_)[None]
         in_the_way = InTheWay(wanted.barriers, coordinates, frame, dt, self.policy.scale_)
 
         def project(sample: int, X: Array, U: Array) -> Array:
-            known = None if wanted.under is None else wanted.under(X)
-            A = in_the_way.rows(X, U, known)
-            return projection(A) if A.shape[1] else free
+            return in_the_way.projections(X, U, None if wanted.under is None else wanted.under(X))
 
         policy: Any = self.policy if self._step is None else self._step
         constrained = bool(wanted.barriers) or wanted.under is not None

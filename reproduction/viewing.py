@@ -58,7 +58,7 @@ def view() -> None:
     type=click.Choice(["inconsistency", "adaptive"]),
     default="inconsistency",
     show_default=True,
-    help="What the policy is learnt by; adaptive takes half a minute more.",
+    help="What the policy is learnt by; adaptive takes ten seconds more.",
 )
 @add_options(*ROBOT, FEET, *SERVED)
 def grasp(

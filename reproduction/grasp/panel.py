@@ -13,11 +13,11 @@ WIDEST, FARTHEST = 0.6, 0.25
 """Of the sliders, in metres."""
 
 KNOWN = {
-    GAP: "Learnt from gaps in the middle, 5 to 45 cm wide as a rule.",
+    GAP: "Training gaps are in the middle, 5 to 45 cm wide as a rule.",
     NOTHING: "Nothing is in the way.",
 }
-NEVER = "The policy never met this: {}."
-REASONS = {GAP: "the gap is moved aside", MIDDLE: "a barrier that has to be reached around"}
+NEVER = "No training barrier is like this: {}."
+REASONS = {GAP: "the gap is moved aside", MIDDLE: "it has to be reached around"}
 
 IN_TIME = 0.97
 """A share of the steps from which on the robot moves in real time, as far as one sees."""

@@ -103,7 +103,7 @@ def test_the_page_in_a_browser(grasp, browser):
     box.fill("0.1")
     box.press("Enter")
     assert wait_for(lambda: abs(grasp.interaction.in_the_way.aside - 0.1) < 1e-9)
-    page.get_by_text("The policy never met this").wait_for()
+    page.get_by_text("No training barrier is like this").wait_for()
 
     camera = next(iter(grasp.server.get_clients().values())).camera
     handle = np.array(grasp.barrier.handles["aside"].position)

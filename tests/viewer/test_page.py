@@ -154,3 +154,9 @@ def test_many_samples_are_thinned_and_it_is_said(policy, monkeypatch):
     shown = samples.choose(policy, demos)
     assert len(shown.demos) <= 50
     assert f"of {len(demos)} samples one in" in shown.notes[0]
+
+
+def test_a_rollout_may_last_longer_than_its_slider_reaches_at_first(page):
+    longer = 2 * page.controls.seconds.max
+    page.set_seconds(longer)
+    assert page.controls.seconds.max == page.controls.seconds.value == longer

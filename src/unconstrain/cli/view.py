@@ -93,8 +93,9 @@ def view(
     """Look at a policy in the browser, and drag the start of a rollout.
 
     POLICY was saved by `unconstrain fit`, and FILES are read as those it was learnt from, unless an option says
-    otherwise. The page is served until Ctrl-C is pressed.
+    otherwise. The page is served until Ctrl-C is pressed. With --constraint the rollout may be under it, too.
     """
+    from unconstrain.constraints.learnt import load_constraint
     from unconstrain.viewer import server
     from unconstrain.viewer import view as open_page
 
@@ -120,6 +121,7 @@ def view(
             robot=robot,
             site=site,
             lock=lock,
+            constraint=None if constraint is None else load_constraint(constraint).rows,
             host=host,
             port=port,
         )

@@ -104,7 +104,11 @@ def view(
     under = None if constraint is None else _rows(constraint, policy.n_actions_)
     policies = {LEARNT: policy}
     other = policy.ordinary_regression()
-    if other is not None and policy.risk != "direct":
+    if policy.risk == "direct":
+        notes.append("the policy is ordinary regression")
+    elif other is None:
+        notes.append("ordinary regression is not shown: the policy does not remember it")
+    else:
         policies[DIRECT] = other
     if isinstance(policy.space_, SecondOrder):
         notes.append(

@@ -76,6 +76,9 @@ class Page:
         host, port = self.stage.server.get_host(), self.stage.server.get_port()
         return f"http://{'localhost' if host in ('127.0.0.1', '0.0.0.0') else host}:{port}"
 
+    def __repr__(self) -> str:
+        return f"<page at {self.url}{', closed' if self._closed.is_set() else ''}>"
+
     def wait(self) -> None:
         """Serve the page until it is closed, or Ctrl-C is pressed, which closes it."""
         try:

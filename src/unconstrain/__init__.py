@@ -13,7 +13,18 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, errors, features, metrics, plot, robots, spaces, torch, viewer
+    from unconstrain import (
+        constraints,
+        datasets,
+        errors,
+        features,
+        metrics,
+        plot,
+        robots,
+        spaces,
+        torch,
+        viewer,
+    )
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -66,6 +77,7 @@ __all__ = [
     "RegressorPolicy",
     "TorchPolicy",
     "constraints",
+    "datasets",
     "distributed",
     "errors",
     "evaluate",
@@ -129,6 +141,7 @@ _HOMES = {
 
 _NAMESPACES = {
     "constraints": "unconstrain.constraints",
+    "datasets": "unconstrain.datasets",
     "distributed": "unconstrain.scaling.cluster",
     "errors": "unconstrain.errors",
     "features": "unconstrain.features",

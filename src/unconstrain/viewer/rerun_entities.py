@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import DataError
+from unconstrain.plot.arrows import find_full_speed, scale_arrows
 from unconstrain.policies.base import Policy
 from unconstrain.viewer import palette
 from unconstrain.viewer.samples import judge
@@ -26,9 +27,6 @@ ALONG = {1: 40, 2: 24, 3: 11}
 
 MOST_ARROWS = 600
 """Where states have more than three dimensions, at so many recorded ones."""
-
-USUAL, LONGEST = 0.9, 1.5
-"""The quantile of speed that is drawn one spacing long, and how many spacings the longest arrow may be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,22 +140,17 @@ def log_field(stream: Any, policy: Policy, demos: Demonstrations, room: Room) ->
     vectors = {
         name: room.place(each.predict(states).reshape(len(states), -1)) for name, (each, _) in fields.items()
     }
-    speed = np.linalg.norm(vectors["learnt"], axis=1)
-    usual = float(np.quantile(speed, USUAL)) or 1.0
+    full = find_full_speed(vectors["learnt"])
     for name, each in vectors.items():
-        length = np.linalg.norm(each, axis=1, keepdims=True)
-        # One fast stretch shall not make all other arrows points.
-        shorter = np.minimum(1.0, LONGEST * usual / np.maximum(length, 1e-300))
         arrows = rr.Arrows3D(
             origins=room.place(states),
-            vectors=each * shorter * (spacing / usual),
+            vectors=spacing * scale_arrows(each, full),
             colors=palette.rgb(fields[name][1]),
             radii=0.06 * spacing,
         )
         stream.log(f"field/{name}", arrows, static=True, strict=True)
     notes.append(
-        f"An arrow of the field {spacing:.3g} long is a speed of {usual:.3g}; none is drawn longer than "
-        f"{LONGEST:g} times that."
+        f"An arrow of the field {spacing:.3g} long is a speed of {full:.3g} or more; shorter ones are in proportion."
     )
     return notes
 

@@ -13,7 +13,18 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, datasets, errors, features, metrics, plot, robots, spaces, torch
+    from unconstrain import (
+        constraints,
+        datasets,
+        errors,
+        features,
+        metrics,
+        plot,
+        robots,
+        spaces,
+        torch,
+        viewer,
+    )
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -88,6 +99,7 @@ __all__ = [
     "spaces",
     "torch",
     "view",
+    "viewer",
 ]
 
 _HOMES = {
@@ -140,6 +152,7 @@ _NAMESPACES = {
     "robots": "unconstrain.robots",
     "spaces": "unconstrain.spaces",
     "torch": "unconstrain.torch",
+    "viewer": "unconstrain.viewer",
 }
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours

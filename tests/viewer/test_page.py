@@ -192,3 +192,9 @@ def test_other_coordinates_are_shown_in_a_scene_of_their_own():
         assert page.notes == []
     finally:
         page.close()
+
+
+def test_a_rollout_may_last_longer_than_its_slider_reaches_at_first(page):
+    longer = 2 * page.controls.seconds.max
+    page.set_seconds(longer)
+    assert page.controls.seconds.max == page.controls.seconds.value == longer

@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from unconstrain.cli import constraining, recordings, reporting, trusting
+from unconstrain.cli import constraining, outputs, recordings, reporting, trusting
 from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.cli.declared import option
 from unconstrain.progress import working
 
 if TYPE_CHECKING:
+    from unconstrain.demonstrations import Demonstrations
+    from unconstrain.policies.base import Policy
     from unconstrain.viewer import Page
 
 SECTION = "Page"
@@ -65,6 +67,14 @@ HOST, PORT = "127.0.0.1", 8080
     help="Where the page can be opened: on this computer only, or with 0.0.0.0 by all that reach it.",
     section=SECTION,
 )
+@option(
+    "--rerun",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write a file for Rerun's viewer (.rrd) instead of serving the page; `rerun FILE` opens it.",
+    section=outputs.SECTION,
+)
+@outputs.overwrite
 @trusting.trusted
 def view(
     policy: Path,
@@ -76,6 +86,8 @@ def view(
     lock: tuple[str, ...],
     port: int,
     host: str,
+    rerun: Path | None,
+    overwrite: bool,
     trusted: tuple[str, ...],
 ) -> None:
     """Look at a policy in the browser, and drag the start of a rollout.
@@ -87,18 +99,25 @@ def view(
     from unconstrain.viewer import server
     from unconstrain.viewer import view as open_page
 
-    server.check_port(host, port)  # before minutes of reading
+    if rerun is None:
+        server.check_port(host, port)  # before minutes of reading
+    else:
+        _check_rerun(rerun, policy, recorded, robot, overwrite=overwrite)
     learnt = trusting.load(policy, trusted)
     with working("reading"):
         recorded = recorded.like(getattr(learnt, "recording_", None))
         demos = constraining.tell(recorded.load(), constraint)
     recordings.describe(demos)
     recorded.check_names(learnt, demos)
+    coordinates = None if shown is None else _positions(shown, demos.state_names)
+    if rerun is not None:
+        _write_rerun(learnt, demos, rerun, coordinates)
+        return
     with working("drawing"):
         page = open_page(
             learnt,
             demos,
-            coordinates=None if shown is None else _positions(shown, demos.state_names),
+            coordinates=coordinates,
             robot=robot,
             site=site,
             lock=lock,
@@ -110,6 +129,31 @@ def view(
         reporting.say(f"note: {in_words_of_program(note)}")
     _say_where(page, host)
     page.wait()
+
+
+def _check_rerun(
+    rerun: Path, policy: Path, recorded: recordings.Recorded, robot: Path | None, *, overwrite: bool
+) -> None:
+    from unconstrain.errors import DataError
+    from unconstrain.viewer.rerun_log import check_suffix, import_rerun
+
+    check_suffix(rerun)
+    if robot is not None:
+        raise DataError("robot= is for the page, and rerun= writes states as they are: leave one of them out")
+    outputs.check_outputs([policy, *recorded.files], {"rerun": rerun}, overwrite=overwrite)
+    import_rerun()
+
+
+def _write_rerun(
+    learnt: "Policy", demos: "Demonstrations", path: Path, coordinates: list[int] | None
+) -> None:
+    from unconstrain.viewer import log_rerun
+
+    with working("writing"):
+        notes = log_rerun(learnt, demos, path, coordinates=coordinates, overwrite=True)
+    for note in notes:
+        reporting.say(f"note: {in_words_of_program(note)}")
+    reporting.say(f"for Rerun's viewer: {path}")
 
 
 def _positions(text: str, names: tuple[str, ...]) -> list[int]:

@@ -20,6 +20,9 @@ newest.py       a thread that works on the newest of what it is given
 timeline.py     play, pause, speed
 exporting.py    picture and rollout as files
 controls.py     what is shown, by checkboxes and dropdowns
+
+robot_scene.py, shapes.py   a robot in viser's scene, moved by its joints
+rerun_log.py, rerun_entities.py, rerun_layout.py   the same for Rerun's viewer, as a file
 """
 
 from typing import TYPE_CHECKING
@@ -29,10 +32,17 @@ from unconstrain import lazy
 if TYPE_CHECKING:
     from unconstrain.viewer.opening import view
     from unconstrain.viewer.page import Page
+    from unconstrain.viewer.rerun_log import log_rerun
+    from unconstrain.viewer.robot_scene import RobotScene
 
-__all__ = ["Page", "view"]
+__all__ = ["Page", "RobotScene", "log_rerun", "view"]
 
-_HOMES = {"unconstrain.viewer.opening": ("view",), "unconstrain.viewer.page": ("Page",)}
+_HOMES = {
+    "unconstrain.viewer.opening": ("view",),
+    "unconstrain.viewer.page": ("Page",),
+    "unconstrain.viewer.rerun_log": ("log_rerun",),
+    "unconstrain.viewer.robot_scene": ("RobotScene",),
+}
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours
     __getattr__, __dir__ = lazy.attach(__name__, _HOMES)

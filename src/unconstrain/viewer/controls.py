@@ -116,6 +116,7 @@ class Controls:
 
     def show_seconds(self, seconds: float) -> None:
         """Let the slider of the time end where rollouts do, and show how long that is."""
+        self.seconds.max = max(self.seconds.max, seconds)
         self.seconds.value = seconds
         self.time.max = seconds
         self.time.value = min(self.time.value, seconds)

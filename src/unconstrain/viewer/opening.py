@@ -128,7 +128,11 @@ def view(
         under=under,
     )
     try:
-        return Page(stage, demos, notes)
+        draw = _draw_robot(served, seen, notes)
+        page = Page(stage, demos, notes)
+        if draw is not None:
+            page.on_state(draw)
+        return page
     except BaseException:
         server.stop(served)
         raise
@@ -177,6 +181,19 @@ def _hand(
         pairs = ", ".join(f"{name} is {joint}" for name, joint in zip(names, loaded.joints, strict=False))
         notes.append(f"states are taken for the joints in their order, so {pairs}")
     return hand
+
+
+def _draw_robot(served: Any, seen: Coordinates, notes: list[str]) -> Callable[[Array], None] | None:
+    """Draw the robot whose hand is shown, and return what shows it in a state; None where there is no robot."""
+    from unconstrain.viewer.hand import Hand
+
+    if not isinstance(seen, Hand):
+        return None
+    from unconstrain.viewer.robot_scene import RobotScene
+
+    drawn = RobotScene(served, seen.robot.model)
+    notes += [*seen.robot.notes, *drawn.notes]
+    return lambda state: drawn.show(seen.joints(state[None])[0])
 
 
 def _rows(constraint: Any, d: int) -> Callable[[Array], Array]:

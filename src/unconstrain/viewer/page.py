@@ -123,7 +123,13 @@ class Page:
         self.timeline.go_to(self.timeline.time)
 
     def drag(self, point: Array) -> None:
-        """Put the start to a point (3,) of the scene; the rollout follows."""
+        """Put the start to a point of the scene; the rollout follows.
+
+        Parameters
+        ----------
+        point : ndarray of shape (3,)
+            In the scene.
+        """
         self._point = point
         self._following.give(None)
 
@@ -136,25 +142,49 @@ class Page:
         self._drawing.give(None)
 
     def show_policy(self, name: str) -> None:
-        """Show another of the policies, by name."""
+        """Show another of the policies, by name.
+
+        Parameters
+        ----------
+        name : str
+            One of ``page.stage.policies``.
+        """
         self.stage.name = name
         self.controls.colours.content = legend.describe_colours(self.stage)
         self.redraw()
         self.follow()
 
     def show_field(self, arrows: bool, streams: bool) -> None:
-        """Show the field as arrows, stream lines, both or not at all."""
+        """Show the field as arrows, stream lines, both or not at all.
+
+        Parameters
+        ----------
+        arrows, streams : bool
+            Whether these are shown.
+        """
         self.field.shows_arrows, self.field.shows_streams = arrows, streams
         self.controls.arrows.value, self.controls.streams.value = arrows, streams
         self.redraw()
 
     def show_through(self, through: str) -> None:
-        """Say where the arrows stand that are over more states than are shown."""
+        """Say where the arrows stand that are over more states than are shown.
+
+        Parameters
+        ----------
+        through : str
+            `field.RECORDED` or `field.HELD`.
+        """
         self.field.through = through
         self.redraw()
 
     def show_diagnosis(self, visible: bool) -> None:
-        """Show what is not determined, which is computed the first time."""
+        """Show what is not determined, which is computed the first time.
+
+        Parameters
+        ----------
+        visible : bool
+            Whether it is shown.
+        """
         self.diagnosis.visible = self.controls.unknown.value = visible
         self.controls.diagnosis.visible = visible
         self.controls.diagnosis.content = legend.describe_notes(
@@ -184,23 +214,47 @@ class Page:
         self.follow()
 
     def set_seconds(self, seconds: float) -> None:
-        """Say how long rollouts last."""
+        """Say how long rollouts last.
+
+        Parameters
+        ----------
+        seconds : float
+            From the start to the end.
+        """
         self.stage.seconds = max(float(seconds), 1e-3)
         self.controls.show_seconds(self.stage.seconds)
         self.follow()
 
     def put_in_the_way(self, chosen: str) -> None:
-        """Put a plane, a box, both or nothing in the way of the rollout."""
+        """Put a plane, a box, both or nothing in the way of the rollout.
+
+        Parameters
+        ----------
+        chosen : str
+            `obstacles.PLANE`, `BOX`, `BOTH` or `NOTHING`.
+        """
         self.controls.obstacles.value = chosen
         self.controls.side.visible = chosen in (BOX, BOTH)
         self.obstacles.choose(chosen, self.stage)
 
     def resize_box(self, side: float) -> None:
-        """Make the box of another side, in the units of what is shown."""
+        """Make the box of another side, in the units of what is shown.
+
+        Parameters
+        ----------
+        side : float
+            Of the whole box.
+        """
         self.obstacles.resize(side * self.stage.frame.scale)
 
     def follow_under(self, is_under: bool) -> None:
-        """Follow the policy under the constraint that was given, or freely."""
+        """Follow the policy under the constraint that was given, or freely.
+
+        Parameters
+        ----------
+        is_under : bool
+            Whether the constraint holds.
+        """
         self._is_under = is_under
         self.follow()
 
@@ -228,7 +282,13 @@ class Page:
             self.redraw()
 
     def control_time(self, what: str) -> None:
-        """Let the time line "play", "pause", or go "to start"."""
+        """Let the time line "play", "pause", or go "to start".
+
+        Parameters
+        ----------
+        what : str
+            "play", "pause" or "to start".
+        """
         if what == "play":
             self.timeline.play()
         else:
@@ -237,7 +297,13 @@ class Page:
                 self.timeline.go_to(0.0)
 
     def draw_svg(self) -> bytes:
-        """Draw the picture as SVG, with matplotlib."""
+        """Draw the picture with matplotlib.
+
+        Returns
+        -------
+        bytes
+            An SVG file.
+        """
         return exporting.svg(self.stage, self.field.sureness(self.stage))
 
     def _follow(self, _: None) -> None:

@@ -74,9 +74,9 @@ def choose(policy: Policy, demos: Demonstrations | None) -> Shown:
     if len(demos) > MOST_JUDGED:
         thin = _thin(demos, every)
         notes.append(f"of {len(demos):,} samples one in {every} is shown, and judged by itself")
-        free, source = _judge(policy, thin)
+        free, source = judge(policy, thin)
         return Shown(_continuous(thin), free, source, tuple(notes))
-    free, source = _judge(policy, demos)
+    free, source = judge(policy, demos)
     if every > 1:
         notes.append(f"of {len(demos):,} samples one in {every} is shown")
         kept = _kept(demos, every)
@@ -84,8 +84,23 @@ def choose(policy: Policy, demos: Demonstrations | None) -> Shown:
     return Shown(_continuous(demos), free, source, tuple(notes))
 
 
-def _judge(policy: Policy, demos: Demonstrations) -> tuple[Array | None, str]:
-    """Say how surely each sample was free, and by what: measured projections come first."""
+def judge(policy: Policy, demos: Demonstrations) -> tuple[Array | None, str]:
+    """Say how surely each sample was free, and by what: measured projections come first.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+    demos : Demonstrations
+        Recordings.
+
+    Returns
+    -------
+    free : ndarray of shape (N,), or None
+        Probabilities, NaN where nothing tells; None where nothing tells of any sample.
+    source : str
+        What says so, in a phrase.
+    """
     N = demos.projections
     known = np.zeros(len(demos), dtype=bool) if N is None else ~np.isnan(N[:, 0, 0])
     try:

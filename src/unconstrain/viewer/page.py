@@ -259,7 +259,13 @@ class Page:
         self.follow()
 
     def lead_anywhere(self, anywhere: bool) -> None:
-        """Let rollouts leave what was recorded, or stop them there."""
+        """Let rollouts leave what was recorded, or stop them there.
+
+        Parameters
+        ----------
+        anywhere : bool
+            Whether they may lead anywhere.
+        """
         self._anywhere = anywhere
         self.follow()
 

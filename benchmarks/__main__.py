@@ -3,6 +3,9 @@
 python -m benchmarks                      all
 python -m benchmarks local-fit growth     some
 python -m benchmarks models               which kind of policy for which data: errors and times, no ratios to reach
+python -m benchmarks rivals               our policies beside GMR, LPV-DS, DMP and behaviour cloning, simulated
+python -m benchmarks rivals-handwriting   the same and SEDS on handwriting; needs --data=FOLDER
+python -m benchmarks rivals-wiping        those without a goal on wiping; needs --data=FOLDER
 python -m benchmarks --out FILE           where the JSON goes (default out/benchmarks.json)
 """
 
@@ -21,8 +24,10 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, models, start, step, stream
+from benchmarks import fits, identifiability, models, start, step, stream, viewer
 from benchmarks.ratio import Ratio
+from benchmarks.rivals import handwriting, simulated, wiping
+from unconstrain.errors import UnconstrainError
 
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "local-fit": fits.local_fit,
@@ -42,16 +47,25 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-local-memory": stream.local_memory,
     **step.BENCHMARKS,
     **start.BENCHMARKS,
+    **viewer.BENCHMARKS,
 }
 
-TABLES: dict[str, Callable[[], None]] = {"models": models.print_tables}
-"""What is compared, not judged; only run by name."""
+TABLES: dict[str, Callable[[Path | None], None]] = {
+    "models": lambda _: models.print_tables(),
+    "rivals": lambda _: simulated.print_tables(),
+    "rivals-handwriting": handwriting.print_table,
+    "rivals-wiping": wiping.print_table,
+}
+"""What is compared, not judged, given the folder of recordings; only run by name."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*BENCHMARKS, *TABLES]))
     parser.add_argument("--out", type=Path, default=Path("out/benchmarks.json"))
+    parser.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="recordings, for rivals-handwriting and rivals-wiping"
+    )
     given = parser.parse_args()
     unknown = set(given.names) - set(BENCHMARKS) - set(TABLES)
     if unknown:
@@ -61,7 +75,10 @@ def main() -> None:
         )
     for name in given.names:
         if name in TABLES:
-            TABLES[name]()
+            try:
+                TABLES[name](given.data)
+            except UnconstrainError as error:
+                parser.error(str(error))
     names = [name for name in given.names or BENCHMARKS if name in BENCHMARKS]
     if not names:
         return

@@ -56,12 +56,12 @@ for name in regressors:
 # Drawn: the true policy, and what each has learnt.
 
 figure, axes = plt.subplots(2, 4, figsize=(13, 6.5), layout="constrained")
-longest = np.linalg.norm(LimitCycle()(np.array([[0.8, 0.8]])))
+square, full_speed = [[-1, -1], [1, 1]], np.linalg.norm(LimitCycle()(np.array([[0.8, 0.8]])))
 for row, risk in zip(axes, ("direct", "adaptive"), strict=True):
-    uc.plot.field(LimitCycle(), longest=longest, ax=row[0])
+    uc.plot.policy(LimitCycle(), region=square, full_speed=full_speed, label=None, ax=row[0])
     row[0].set_title("true policy")
     for ax, name in zip(row[1:], regressors, strict=True):
-        uc.plot.field(policies[name, risk], longest=longest, ax=ax)
+        uc.plot.policy(policies[name, risk], region=square, full_speed=full_speed, label=None, ax=ax)
         ax.set_title(f"{name}, {'as recorded' if risk == 'direct' else 'wrapped'}")
 for ax in axes.flat:
     ax.set_aspect("equal", adjustable="box")

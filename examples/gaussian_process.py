@@ -61,7 +61,6 @@ shades = ax.contourf(
     axis, axis, share.reshape(49, 49), levels=levels, extend="both", cmap="Greys", norm="log"
 )
 figure.colorbar(shades, ax=ax, label="standard deviation / usual speed", ticks=levels, format="%g")
-uc.plot.trajectory(seen.states, episodes=seen.episodes, ax=ax)
-uc.plot.field(policy, ax=ax)
+uc.plot.policy(policy, seen, region=[[-1, -1], [1, 1]], ax=ax)
 ax.set(aspect="equal", xlim=(-1.2, 1.2), ylim=(-1.2, 1.2), title="learnt from four movements")
 plt.show()

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-LAZY = ["unconstrain", "unconstrain.recordings", "unconstrain.robots"]
+LAZY = ["unconstrain", "unconstrain.datasets", "unconstrain.recordings", "unconstrain.robots"]
 
 
 def _python(code):

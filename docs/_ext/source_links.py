@@ -4,23 +4,26 @@ import re
 
 from sphinx.application import Sphinx
 
-OUTSIDE = re.compile(r"\]\(\.\./(?!README\.md\)|CHANGELOG\.md\))([^)\s#]+)\)")
+OUTSIDE = r"\]\({up}(?!README\.md\)|CHANGELOG\.md\))([^)\s#]+)\)"
 
 
 def point(app: Sphinx, docname: str, source: list[str]) -> None:
     """Point a page's links to `../examples/x.py` to that example's page, and others to the repository.
 
-    On GitHub they lead to the file itself, and a site has no such files.
+    The header of the examples is the gallery. On GitHub they lead to the file itself, and a site has no such files.
     """
+    depth = docname.count("/")
 
     def target(link: re.Match[str]) -> str:
         path = link[1]
-        if path.startswith("examples/") and path.endswith(".py"):
-            depth = docname.count("/")
+        if path == "examples/GALLERY_HEADER.rst":
+            return f"]({'../' * depth}gallery/index.rst)"
+        without_page = re.search(app.config.sphinx_gallery_conf["ignore_pattern"], path)
+        if path.startswith("examples/") and path.endswith(".py") and not without_page:
             return f"]({'../' * depth}gallery/{path.removeprefix('examples/').removesuffix('.py')}.rst)"
         return f"]({app.config.repository}/blob/main/{path})"
 
-    source[0] = OUTSIDE.sub(target, source[0])
+    source[0] = re.sub(OUTSIDE.format(up=r"\.\./" * (depth + 1)), target, source[0])
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -38,13 +38,11 @@ def plot_figure_1(
         (free, DIRECT, "free"),
         (blocked, TRUE, "along the obstacle"),
     ):
-        plot.trajectory(
-            movement.states, episodes=movement.episodes, color=color, label=label, ax=panels["fields"]
-        )
+        plot.demonstrations(movement, color=color, label=label, ax=panels["fields"])
     panels["fields"].set_title("(c) one policy, two behaviours", fontsize=11)
 
     picked = slice(None, None, 40)
-    plot.trajectory(seen.states, episodes=seen.episodes, label="recorded movements", ax=panels["learnt"])
+    plot.demonstrations(seen, label="recorded movements", ax=panels["learnt"])
     X = seen.states[picked]
     _draw_arrows(panels["learnt"], X, finger.policy(X), TRUE, "policy π", width=0.011)
     _draw_arrows(panels["learnt"], X, direct.predict(X), DIRECT, "ordinary regression")

@@ -31,7 +31,7 @@ def plot_toy(seed: int = 0, movements: int = 4) -> Figure:
     figure = Figure(figsize=(10.5, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     levels = np.geomspace(1e-3, 10.0, 17)
-    plot.standard_deviation(report, (-1.0, -1.0), (1.0, 1.0), levels=levels, ax=left)
+    plot.identifiability(report, region=((-1.0, -1.0), (1.0, 1.0)), levels=levels, worst=0, ax=left)
     left.set_title("predicted: standard deviation of the policy", fontsize=10.5)
     axis = np.linspace(-1.0, 1.0, 60)
     X = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
@@ -39,11 +39,11 @@ def plot_toy(seed: int = 0, movements: int = 4) -> Figure:
     shown = right.contourf(
         axis, axis, np.clip(error, levels[0], levels[-1]), levels, norm="log", cmap="viridis"
     )
-    plot.trajectory(demos.states, episodes=demos.episodes, color="white", ax=right)
+    plot.demonstrations(demos, color="white", ax=right)
     right.set(xlabel="x1", ylabel="x2", aspect="equal", xlim=(-1, 1), ylim=(-1, 1))
     right.set_title("actual: error of the policy", fontsize=10.5)
     figure.colorbar(
-        shown, ax=right, ticks=[1e-3, 1e-2, 1e-1, 1, 10], format="%g", label="units of the action"
+        shown, ax=right, ticks=[1e-3, 1e-2, 1e-1, 1, 10], format="%g", label="units of the action", shrink=0.8
     )
     return figure
 

@@ -16,6 +16,9 @@ from unconstrain.limit_cycle import LimitCycle, demonstrate
 from unconstrain.plot.colors import DIRECT, LEARNT, TRUE
 from unconstrain.policies import ParametricPolicy
 
+SQUARE = ((-1.0, -1.0), (1.0, 1.0))
+"""Corners of the region that is drawn."""
+
 MOVEMENTS, FEW = 40, 4
 """Movements in a data set, and in a small one."""
 
@@ -237,15 +240,13 @@ def _plot_panels(panels: Sequence[tuple[str, ParametricPolicy, Demonstrations, s
     free = demonstrate(8, 300, constrained=False, random_state=np.random.default_rng([0, 2]))
     figure = Figure(figsize=(3.5 * (len(panels) + 1), 4.3), layout="constrained")
     first, *others = figure.subplots(1, len(panels) + 1)
-    # The length of the arrows halfway between the cycle and the corners: those at the corners may overlap.
+    # The speed halfway between the cycle and the corners, where all are faster.
     longest = float(np.linalg.norm(LimitCycle()(np.array([[0.8, 0.8]]))))
-    plot.trajectory(free.states, episodes=free.episodes, ax=first)
-    plot.field(LimitCycle(), color=TRUE, longest=longest, ax=first)
+    plot.policy(LimitCycle(), free, region=SQUARE, color=TRUE, full_speed=longest, label=None, ax=first)
     first.set_title("true policy", fontsize=12)
     first.set_xlabel("x1")
     for ax, (title, policy, shown, color, caption) in zip(others, panels, strict=True):
-        plot.trajectory(shown.states, episodes=shown.episodes, ax=ax)
-        plot.field(policy, color=color, longest=longest, ax=ax)
+        plot.policy(policy, shown, region=SQUARE, color=color, full_speed=longest, label=None, ax=ax)
         ax.set_title(title, fontsize=12)
         ax.set_xlabel(f"x1\n{caption}")
     for ax in figure.axes:

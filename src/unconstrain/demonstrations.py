@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from unconstrain import demonstrations_file
+from unconstrain import demonstrations_file, demonstrations_words
 from unconstrain.arrays import check_number, check_numbers, check_whole, quote
 from unconstrain.errors import DataError, UnconstrainError, printable
 from unconstrain.spaces import Numbers, Phased, Space
@@ -428,6 +428,9 @@ class Demonstrations:
         labels = np.array(self.episode_labels, dtype=object)[self.episodes]
         plain = {name: list(values) if values.ndim > 1 else values for name, values in columns.items()}
         return pandas.DataFrame(plain | {roles["episodes"]: labels})
+
+    def _repr_html_(self) -> str:
+        return demonstrations_words.to_html(self)
 
     def __repr__(self) -> str:
         optional = ("time", "policy", "projections", "forces", "free")

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from unconstrain.notebook import NotebookBar, is_notebook
+
 Report = Callable[[int, int | None], None]
 """Called with what is done and what there is in all, None where that is not known.
 
@@ -34,7 +36,8 @@ def reporting(progress: bool | Report | None, unit: str = "rows") -> Iterator[Re
     Parameters
     ----------
     progress : bool, function or None
-        True shows a bar, with rate and time left; a function is itself called; False and None show nothing.
+        True shows a bar, with rate and time left, in a notebook below the cell; a function is itself called; False and
+        None show nothing.
     unit : str
         What is counted.
 
@@ -48,6 +51,9 @@ def reporting(progress: bool | Report | None, unit: str = "rows") -> Iterator[Re
         return
     if not progress:
         yield lambda done, total: None
+        return
+    if is_notebook():  # where rich shows nothing without a package that few have
+        yield NotebookBar(unit)
         return
     from rich.console import Console  # rich takes a while to import, and is not always needed
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn

@@ -51,6 +51,7 @@ from unconstrain.judging import (
     OF_WHOLE_ACTIONS,
     Judge,
 )
+from unconstrain.notebook import format_sentences, format_table
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.policies.linear import LinearPolicy
@@ -140,13 +141,34 @@ class Table:
 
     def __str__(self) -> str:
         """Format a Markdown table, its columns aligned."""
-        head = ("candidate", self.measure, "explained", "λ", "parameters", "seconds")
-        lines = [head, *(_cells(row) for row in self.rows if row.problem is None)]
-        widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+        lines = [self._head, *(_cells(row) for row in self.rows if row.problem is None)]
+        widths = [max(len(line[i]) for line in lines) for i in range(len(self._head))]
         text = [_line([c.ljust(w) for c, w in zip(line, widths, strict=True)]) for line in lines]
         text.insert(1, _line(["-" * w for w in widths]))
-        failed = [f"{row.name}: {row.problem}" for row in self.rows if row.problem is not None]
+        failed = self._failed
         return "\n".join([*text, *([""] if failed else []), *failed])
+
+    def to_html(self) -> str:
+        """Format a table in HTML, which notebooks show.
+
+        Returns
+        -------
+        str
+            HTML.
+        """
+        rows = (_cells(row) for row in self.rows if row.problem is None)
+        return format_table(self._head, rows) + format_sentences(self._failed)
+
+    def _repr_html_(self) -> str:
+        return self.to_html()
+
+    @property
+    def _head(self) -> tuple[str, ...]:
+        return ("candidate", self.measure, "explained", "λ", "parameters", "seconds")
+
+    @property
+    def _failed(self) -> list[str]:
+        return [f"{row.name}: {row.problem}" for row in self.rows if row.problem is not None]
 
 
 @dataclass(frozen=True)
@@ -178,6 +200,9 @@ class Selection:
 
     def __str__(self) -> str:
         return f"{self.table}\n\nchosen: {self.name}"
+
+    def _repr_html_(self) -> str:
+        return self.table.to_html() + format_sentences([f"chosen: {self.name}"])
 
 
 def candidates(n: int, d: int) -> dict[str, Policy]:

@@ -76,7 +76,7 @@ def test_regression_of_what_known_constraints_let_through_is_not_ordinary():
 def test_arrays_will_do_and_nonsense_is_refused(bent):
     policy, others = bent
     assert uc.evaluate(policy, others.states, others.actions, groups=others.episodes).policy.rmse > 0
-    with pytest.raises(uc.errors.DataError, match="evaluate\\(policy, X, U\\)"):
+    with pytest.raises(uc.errors.DataError, match="give the actions beside the states"):
         uc.evaluate(policy, others.states)
     with pytest.raises(uc.errors.DataError, match="choose the columns"):
         uc.evaluate(policy, others.states[:, :1], others.actions)

@@ -25,7 +25,6 @@ ELSEWHERE = {
     "load_policy",
     "load_compiled",
     "load_constraint",
-    "check_suffix",
     "view",
 }
 """Functions about files, which other areas call."""
@@ -45,6 +44,9 @@ HOW = {
     "color",
     "style",
     "label",
+    "labels",
+    "direct",
+    "against_time",
     "posterior",
     "stop_when",
 }
@@ -117,18 +119,14 @@ class Problem:
         """A valid value of an argument; KeyError where none is known."""
         own = f"{function.rpartition('.')[2]}.{name}"
         of_one = {
-            "constraint.learnt": self.constraint, "constraint_figure.learnt": self.constraint,
-            "shares_of_motion.learnt": self.constraint, "policy_figure.learnt": self.policy,
+            "constraint.learnt": self.constraint, "policy.region": lambda: [self.X.min(0), self.X.max(0)],
+            "identifiability.coordinates": lambda: (0, 1), "comparison.other": lambda: lambda X: X,
             "fit_stream.recordings": lambda: [(self.X, self.U, self.groups)], "fit_stream.policy": uc.ParametricPolicy,
             "first_known.projections": lambda: [self.N, self.N],
-            "comparison.policies": lambda: {"one": self.policy()},
             "select_policy.candidates": lambda: {"a": uc.ParametricPolicy(), "b": uc.ParametricPolicy(alpha=1.0)},
             "ConstraintChain.policy": uc.ParametricPolicy, "ConstraintChain.constraint": uc.ConstantConstraint,
             "Demonstrations.policy": lambda: self.Pi, "save.moments": lambda: self.policy().resume().moments(),
-            "shown_by.policy": self.policy, "trajectory.episodes": lambda: self.groups,
-            "identifiability_figure.report": lambda: uc.identifiability(self.policy(), self.X, self.U),
-            "standard_deviation.report": lambda: uc.identifiability(self.policy(), self.X, self.U),
-            "comparison.demonstrations": self.demonstrations, "fit_stream.batch_rows": lambda: 7,
+            "shown_by.policy": self.policy, "fit_stream.batch_rows": lambda: 7,
         }  # fmt: skip
         by_name: dict[str, Callable[[], Any]] = {
             "X": lambda: self.X, "states": lambda: self.X, "x": lambda: self.X[0], "start": lambda: self.X[0],
@@ -140,7 +138,7 @@ class Problem:
             "force_threshold": lambda: 0.5, "groups": lambda: self.groups, "episodes": lambda: self.groups,
             "conditions": lambda: self.groups, "sample_weight": lambda: np.linspace(0.1, 1.0, self.count),
             "d": lambda: self.d, "error": lambda: 0.5, "policy": self.policy, "demonstrations": self.demonstrations,
-            "movement": self.demonstrations, "movements": self.demonstrations,
+            "movement": self.demonstrations, "demos": self.demonstrations, "coordinates": lambda: (0, self.n - 1),
             "path": lambda: str(self.folder / "out.skops"),
             "parts": lambda: [self.demonstrations()], "low": lambda: self.X.min(0), "high": lambda: self.X.max(0) + 1,
             "time": lambda: np.arange(self.count) * 0.1, "action_names": lambda: [f"u{i}" for i in range(self.d)],
@@ -149,7 +147,8 @@ class Problem:
             "n_centers": lambda: 4, "width": lambda: 1.0, "n_constraints": lambda: 1, "alpha": lambda: 0.1,
             "return_std": lambda: True, "return_cov": lambda: True, "n_jobs": lambda: 1, "without": lambda: 0,
             "constraint": lambda: np.ones((1, self.d)), "random_state": lambda: 1, "figure": self.figure,
-            "report": lambda: uc.identifiability(self.policy(), self.X, self.U), "color": lambda: "k",
+            "report": lambda: uc.identifiability(self.policy(), self.X, self.U), "levels": lambda: [0.1, 1.0],
+            "worst": lambda: 2, "full_speed": lambda: 1.0,
             "features": lambda: None, "transformer": lambda: None, "component": lambda: None,
         }  # fmt: skip
         return (of_one.get(own) or by_name[name])()

@@ -92,7 +92,7 @@ def describe(comparison: "Comparison", evaluation: "Evaluation") -> None:
     reporting.say(f"λ: {policy.alpha_:.3g}{chosen}")
     inferred = describe_inferred(policy)
     if inferred:
-        reporting.say(inferred)
+        reporting.say(in_words_of_program(inferred))
     reporting.say_table(("held out", *COLUMNS[1:]), evaluation.rows())
     if is_given("risk"):
         if better is not None:

@@ -82,7 +82,7 @@ def constraints(
         raise PolicyError(f"n_centers= is for --model rbf, and this is {model}")
     if n_constraints is not None and model == "mechanism":
         raise PolicyError("--rows is not for --model mechanism, whose kind says how many there are")
-    from unconstrain import metrics, plot
+    from unconstrain import metrics
     from unconstrain.constraints.learnt import ConstantConstraint, FeatureConstraint, MechanismConstraint
     from unconstrain.constraints.learnt.base import LearntConstraint, held_out_projections
     from unconstrain.features import NormalizedRBF
@@ -114,7 +114,10 @@ def constraints(
         )
     learnt.save(out)
     if figure is not None:
-        plot.save(plot.constraint_figure(learnt, demos), figure)
+        from unconstrain import plot
+        from unconstrain.plot import figures
+
+        plot.save(figures.draw_constraint(learnt, demos), figure)
     reporting.say(learnt.describe(demos.states, demos.action_names))
     reporting.say(
         "motion across the constraint, on what was held out: "

@@ -7,7 +7,7 @@ import click
 
 from unconstrain import atomic
 from unconstrain.cli import outputs, reporting
-from unconstrain.cli.command import command
+from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.errors import UnconstrainError
 from unconstrain.progress import working
 
@@ -40,8 +40,8 @@ def demo(out: Path, overwrite: bool) -> None:
         raise UnconstrainError(f"cannot make the folder {out}: {error.strerror}") from error
     for path in (picture, table, data, others):
         outputs.check_new(path, "out", overwrite=overwrite)
+    from unconstrain import datasets, plot
     from unconstrain import demo as experiment
-    from unconstrain import plot
     from unconstrain.policies.inferred import describe_inferred
     from unconstrain.recordings.text import write_csv
 
@@ -60,8 +60,10 @@ def demo(out: Path, overwrite: bool) -> None:
     reporting.say(
         "nUPE, nCPE: squared error without and with constraints, as a share of the policy's variance"
     )
-    reporting.say(describe_inferred(policies["adaptive"]))
+    reporting.say(in_words_of_program(describe_inferred(policies["adaptive"])))
     reporting.say(f"picture: {picture}\ntable: {table}\ndata: {data}\nheld out: {others}")
+    wiping = reporting.shell_word(datasets.path("wiping.csv"))
+    reporting.say(f"another recording, a hand that wipes boards, with a force sensor: {wiping}")
     reporting.say("\nnext, the same from a file (put your own in its place):")
     reporting.say(
         f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --episode episode --model rbf "

@@ -66,8 +66,9 @@ def diagnose(
         text = found.describe(demos.state_names, demos.action_names, most)
     if figure is not None:
         from unconstrain import plot
+        from unconstrain.plot import figures
 
-        plot.save(plot.identifiability_figure(found, demos.state_names), figure)
+        plot.save(figures.draw_identifiability(found), figure)
     comparing.describe(comparison, evaluation)
     reporting.say()
     reporting.say(text)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from unconstrain.cli import comparing, constraining, models, outputs, recordings, reporting, stabilizing
-from unconstrain.cli.command import command
+from unconstrain.cli.command import command, in_words_of_program
 from unconstrain.cli.declared import option
 from unconstrain.errors import PolicyError
 from unconstrain.progress import working
@@ -112,7 +112,7 @@ def fit(
         reporting.say(describe_fit(policy))
         inferred = describe_inferred(policy)
         if inferred:
-            reporting.say(inferred)
+            reporting.say(in_words_of_program(inferred))
         reporting.say(
             "not compared with ordinary regression, as this was a stream: `unconstrain evaluate` compares both on "
             "recordings that were held back"
@@ -134,8 +134,9 @@ def fit(
     policy.save(out, resumable=resumable)
     if figure is not None:
         from unconstrain import plot
+        from unconstrain.plot import figures
 
-        plot.save(plot.policy_figure(policy, demos), figure)
+        plot.save(figures.draw_policy(policy, demos), figure)
     comparing.describe(comparison, evaluation)
     if stable_at is not None:
         stabilizing.describe(policy)

@@ -121,6 +121,7 @@ def rollout(
     import numpy as np
 
     from unconstrain import plot
+    from unconstrain.plot import figures
     from unconstrain.policies.unsure import Unsure
     from unconstrain.recordings.text import write_csv
     from unconstrain.simulation import rollout as integrate
@@ -166,7 +167,7 @@ def rollout(
     arrival = None if learnt.stability_ is None else stabilizing.describe_arrival(learnt, movement)
     shown = movement if frame is None else _out_of(frame, movement)
     write_csv(shown, out)
-    plot.save(plot.rollout_figure(shown), figure)
+    plot.save(figures.draw_rollout(shown), figure)
     end = zip(shown.state_names, shown.states[-1], shown.states.std(axis=0), strict=True)
     reached = ", ".join(f"{name} {reporting.shown_number(value, scale)}" for name, value, scale in end)
     reporting.say(f"after {taken * dt:g} s: {reached}")

@@ -96,13 +96,16 @@ def identifiability(
         return Identifiability(policy, Information.from_fit(policy), threshold)
     if X is None:
         raise DataError(BOTH_OR_NEITHER)
+    names = (X.state_names, X.action_names) if isinstance(X, Demonstrations) else (None, None)
     if isinstance(X, Demonstrations) and groups is None and X.n_episodes > 1:
         groups = [X.episode_labels[code] for code in X.episodes]
     states, actions, groups, projections = unpack_demonstrations(X, U, groups, projections)
     if actions is None:
         raise DataError(BOTH_OR_NEITHER)
     samples, n_silent = check_recordings(policy, states, actions, groups, sample_weight, projections)
-    return Identifiability(policy, Information.from_samples(policy, samples), threshold, samples, n_silent)
+    return Identifiability(
+        policy, Information.from_samples(policy, samples), threshold, samples, n_silent, *names
+    )
 
 
 def check_recordings(

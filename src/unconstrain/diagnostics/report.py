@@ -17,7 +17,7 @@ from unconstrain.diagnostics.foresight import Foresight
 from unconstrain.diagnostics.information import Information
 from unconstrain.diagnostics.regions import POOL, Region, find_worst_regions, orient
 from unconstrain.diagnostics.spectrum import compute_shares
-from unconstrain.diagnostics.words import describe
+from unconstrain.diagnostics.words import describe, format_report
 from unconstrain.errors import DataError, PolicyError
 from unconstrain.features.centers import farthest_first
 from unconstrain.features.scaling import Scaling
@@ -44,6 +44,8 @@ class Identifiability:
         The recordings, where they are at hand: the samples with motion or a known projection.
     n_silent : int
         How many samples were left out, since they have neither.
+    state_names, action_names : sequence of str, optional
+        Names of the n states and the d actions; x1, x2, ... and u1, u2, ... by default.
     """
 
     def __init__(
@@ -53,12 +55,17 @@ class Identifiability:
         threshold: float,
         samples: Samples | None = None,
         n_silent: int = 0,
+        state_names: Sequence[str] | None = None,
+        action_names: Sequence[str] | None = None,
     ):
         self.policy = policy
         self.information = information
         self.threshold = threshold
         self.samples = samples
         self.n_silent = n_silent
+        n, d = policy.n_features_in_, policy.n_actions_
+        self.state_names = tuple(state_names or (f"x{i + 1}" for i in range(n)))
+        self.action_names = tuple(action_names or (f"u{i + 1}" for i in range(d)))
 
     @cached_property
     def spectra(self) -> list[np.ndarray]:
@@ -418,6 +425,9 @@ class Identifiability:
                 1, f"local models: {shares.min():.1%} to {shares.max():.1%} determined, {len(shares)} models"
             )
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return format_report(self)
 
     @property
     def _risks(self) -> np.ndarray:

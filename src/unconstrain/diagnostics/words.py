@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from unconstrain.notebook import format_sentences, format_table
+
 if TYPE_CHECKING:
     from unconstrain.diagnostics.report import Identifiability
 
@@ -55,6 +57,36 @@ def describe(
             f"±{one.deviation:.3g}, and {one.gain:.1%} of the expected squared error left by then would go."
         )
     return "\n".join(lines)
+
+
+def format_report(report: "Identifiability", k: int = 3) -> str:
+    """Write shares, bounds, and the worst regions in HTML, which notebooks show.
+
+    Parameters
+    ----------
+    report : Identifiability
+        Of recordings, or of moments alone, whose regions are not known.
+    k : int
+        How many regions to name.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    said = format_sentences(repr(report).splitlines())
+    if report.samples is None:
+        return said
+    rows = [
+        (
+            format_state(region.state, report.state_names),
+            format_direction(region.direction, report.action_names),
+            f"±{region.deviation:.3g}",
+            f"{region.speed:.3g}",
+        )
+        for region in report.worst_regions(k)
+    ]
+    return said + format_table(("known least at", "along", "to within", "policy's speed there"), rows)
 
 
 def describe_episodes(report: "Identifiability", k: int = 3) -> list[str]:

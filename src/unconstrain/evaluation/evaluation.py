@@ -1,8 +1,7 @@
 """A policy held against recordings that it has not seen, beside ordinary regression and standing still."""
 
-import html
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -21,7 +20,9 @@ from unconstrain.evaluation.findings import collect
 from unconstrain.evaluation.scores import Score, find_typical, gaussian_log_likelihood, score
 from unconstrain.evaluation.verdict import Verdict, conclude
 from unconstrain.judging import OF_WHAT_IS_SHOWN, Judge
+from unconstrain.notebook import format_sentences, format_table
 from unconstrain.policies.base import Policy
+from unconstrain.policies.inputs import as_demonstrations
 from unconstrain.selection import select_policy
 
 if TYPE_CHECKING:
@@ -144,12 +145,7 @@ class Evaluation:
         return "\n".join([*table, "", *self.sentences()])
 
     def _repr_html_(self) -> str:
-        def line(cells: Sequence[str], tag: str) -> str:
-            return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-        rows = "".join(line(row, "td") for row in self.rows())
-        said = "".join(f"<p>{html.escape(each)}</p>" for each in self.sentences())
-        return f"<table><thead>{line(COLUMNS, 'th')}</thead><tbody>{rows}</tbody></table>{said}"
+        return format_table(COLUMNS, self.rows()) + format_sentences(self.sentences())
 
 
 def evaluate(
@@ -212,7 +208,7 @@ def evaluate(
     if not isinstance(policy, Policy):
         raise PolicyError(f"evaluate is about a policy of unconstrain, got {type(policy).__name__}")
     check_is_fitted(policy)
-    demos = _as_demonstrations(X, U, groups)
+    demos = as_demonstrations(X, U, groups)
     if demos.states.shape[1] != policy.n_features_in_ or demos.actions.shape[1] != policy.n_actions_:
         raise DataError(
             f"the policy maps {policy.n_features_in_} states to {policy.n_actions_} actions, but the recordings have "
@@ -334,21 +330,6 @@ def _projections(policy: Policy, demos: Demonstrations) -> np.ndarray | None:
     if known is None or policy.risk == "direct":
         return None
     return known if scale is None else in_metric(known, scale)
-
-
-def _as_demonstrations(
-    X: Demonstrations | ArrayLike, U: ArrayLike | None, groups: ArrayLike | None
-) -> Demonstrations:
-    if isinstance(X, Demonstrations):
-        if U is not None:
-            raise DataError(
-                "demonstrations bring their own actions: give the demonstrations alone, or states and actions"
-            )
-        return X
-    if U is None:
-        raise DataError("give the actions beside the states: evaluate(policy, X, U)")
-    actions = np.asarray(U)
-    return Demonstrations(X, actions[:, None] if actions.ndim == 1 else actions, groups)
 
 
 def _cells(each: Score) -> tuple[str, ...]:

@@ -1,7 +1,10 @@
-"""Pictures of policies, movements, constraints and of what recordings determine, on matplotlib.
+"""Pictures of policies, movements, contact, constraints and of what recordings determine, on matplotlib.
 
-Functions that draw one picture take `ax=` and return the axes; functions whose name ends in `_figure` compose several
-of them and return a figure, as the command line saves it with `save`. matplotlib is imported when a picture is drawn.
+Each function draws one picture, takes `ax=` and returns the axes; without `ax` it makes new ones. `save` writes a
+figure, as the command line does. matplotlib is imported when a picture is drawn.
+
+Pictures of two states are to one scale where both have the same unit. Units are taken from names such as "x [m]", and
+of angles from the space of the states.
 
 The colours are those of Okabe and Ito, which stay apart for colour-blind readers and in greyscale.
 """
@@ -9,37 +12,33 @@ The colours are those of Okabe and Ito, which stay apart for colour-blind reader
 from typing import TYPE_CHECKING
 
 from unconstrain.lazy import attach
-from unconstrain.plot.saving import check_suffix, save
+from unconstrain.plot.saving import save
 
 if TYPE_CHECKING:
-    from unconstrain.plot.constraints import constraint, constraint_figure, shares_of_motion
-    from unconstrain.plot.diagnostics import identifiability_figure, standard_deviation
-    from unconstrain.plot.policies import agreement, comparison, field, policy, policy_figure
-    from unconstrain.plot.trajectories import rollout_figure, trajectory
+    from unconstrain.plot.constraints import constraint
+    from unconstrain.plot.contacts import contact
+    from unconstrain.plot.diagnostics import identifiability
+    from unconstrain.plot.movements import demonstrations, rollout
+    from unconstrain.plot.policies import comparison, policy
 
 __all__ = [
-    "agreement",
-    "check_suffix",
     "comparison",
     "constraint",
-    "constraint_figure",
-    "field",
-    "identifiability_figure",
+    "contact",
+    "demonstrations",
+    "identifiability",
     "policy",
-    "policy_figure",
-    "rollout_figure",
+    "rollout",
     "save",
-    "shares_of_motion",
-    "standard_deviation",
-    "trajectory",
 ]
 
 __getattr__, __dir__ = attach(
     __name__,
     {
-        "unconstrain.plot.constraints": ("constraint", "constraint_figure", "shares_of_motion"),
-        "unconstrain.plot.diagnostics": ("identifiability_figure", "standard_deviation"),
-        "unconstrain.plot.policies": ("agreement", "comparison", "field", "policy", "policy_figure"),
-        "unconstrain.plot.trajectories": ("rollout_figure", "trajectory"),
+        "unconstrain.plot.constraints": ("constraint",),
+        "unconstrain.plot.contacts": ("contact",),
+        "unconstrain.plot.diagnostics": ("identifiability",),
+        "unconstrain.plot.movements": ("demonstrations", "rollout"),
+        "unconstrain.plot.policies": ("comparison", "policy"),
     },
 )

@@ -12,5 +12,8 @@ DIRECT = "#D55E00"
 RECORDED = "#777777"
 """Recorded movements."""
 
+PALE = "#B8B8B8"
+"""Recorded actions, on which others are drawn."""
+
 SERIES = (LEARNT, DIRECT, "#009E73", "#CC79A7")
 """Things of equal standing, in this order."""

@@ -1,66 +1,54 @@
-"""Learnt constraints: how the motion is shared out among directions, and where the rows point."""
+"""Learnt constraints: where the rows point, over what was recorded."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
 
+from unconstrain.arrays import quote
 from unconstrain.constraints.learnt.base import LearntConstraint
 from unconstrain.constraints.learnt.lines import align
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError
-from unconstrain.plot.axes import get_axes, label_plane
-from unconstrain.plot.colors import DIRECT, LEARNT, RECORDED
+from unconstrain.errors import DataError, PolicyError
+from unconstrain.plot.axes import check_coordinates, get_axes, label_axes
+from unconstrain.plot.colors import DIRECT
+from unconstrain.plot.columns import find_velocities
+from unconstrain.plot.fields import draw_arrows, pick_columns, spread_samples
+from unconstrain.plot.movements import demonstrations
+from unconstrain.policies.inputs import as_demonstrations
 
-ARROWS = 60
-ARROW_LENGTH = 0.12
-"""In extents of the recording."""
-SHOWN_POINTS = 1000
+Array = NDArray[np.float64]
 
 
-def shares_of_motion(learnt: LearntConstraint, *, ax: Axes | None = None) -> Axes:
-    """Draw how much of the motion there was along each direction, constrained ones marked.
+def constraint(
+    learnt: LearntConstraint,
+    demos: Demonstrations | ArrayLike,
+    U: ArrayLike | None = None,
+    *,
+    groups: ArrayLike | None = None,
+    coordinates: Sequence[int] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the rows of a constraint, the directions of no motion, over the recorded movements.
 
     Parameters
     ----------
-    learnt : ConstantConstraint or FeatureConstraint
-        A fitted constraint.
+    learnt : ConstantConstraint, FeatureConstraint or MechanismConstraint
+        Fitted.
+    demos : Demonstrations, or array_like of shape (N, n)
+        Recordings, or their states. Where actions are velocities of two or three states, rows are arrows at recorded
+        ones; else their mean squares are a table, a row each and a column for each action.
+    U : array_like of shape (N, d), optional
+        Actions, beside states.
+    groups : array_like of shape (N,), optional
+        Episodes, beside states.
+    coordinates : sequence of int, optional
+        Draw the rows over two or three states, as for `demonstrations`, whatever there are; an arrow is then shorter
+        the more of its row lies along others. By default three states are drawn in space, unless `ax` is a plane.
     ax : Axes, optional
         Where to draw; new axes by default.
-
-    Returns
-    -------
-    Axes
-        With a bar for each direction, from the one least moved in.
-    """
-    ax = get_axes(ax)
-    shares, k, d = learnt.shares_, learnt.n_constraints_, learnt.n_actions_
-    every = len(shares) == d
-    bars = shares if every else np.append(shares, 1.0 - shares.sum())
-    names = [f"{i + 1}" for i in range(len(shares))] + ([] if every else ["all others"])
-    ax.bar(names, 100 * bars, color=[DIRECT] * k + [LEARNT] * (len(bars) - k))
-    for i, share in enumerate(bars):
-        ax.annotate(f"{share:.2%}", (i, 100 * share), ha="center", va="bottom", fontsize=9)
-    ax.set(
-        xlabel="direction, from the least moved in", ylabel="share of motion (%)",
-        title=f"{k} of {d} directions constrained",
-    )  # fmt: skip
-    return ax
-
-
-def constraint(learnt: LearntConstraint, demonstrations: Demonstrations, *, ax: Axes | None = None) -> Axes:
-    """Draw the rows of a constraint over the recorded states.
-
-    Parameters
-    ----------
-    learnt : ConstantConstraint or FeatureConstraint
-        A fitted constraint.
-    demonstrations : Demonstrations
-        What it was learnt from. Where actions are velocities of two or three positions, rows are arrows at the
-        recorded points; else their mean squares are a table, a row each and a column for each action.
-    ax : Axes, optional
-        Where to draw, in three dimensions for three positions; new axes by default.
 
     Returns
     -------
@@ -70,85 +58,48 @@ def constraint(learnt: LearntConstraint, demonstrations: Demonstrations, *, ax: 
     Raises
     ------
     DataError
-        The demonstrations have other states or actions than the constraint.
+        The recordings have other states or actions than the constraint, or no such coordinates.
+    PolicyError
+        It is no constraint.
     """
-    A = learnt.rows(demonstrations.states)
-    d = demonstrations.actions.shape[1]
+    if not isinstance(learnt, LearntConstraint):
+        raise PolicyError(
+            f"a constraint is one that was learnt, such as ConstantConstraint, not {quote(learnt)}"
+        )
+    demos = as_demonstrations(demos, U, groups)
+    A, n, d = learnt.rows(demos.states), demos.states.shape[1], demos.actions.shape[1]
     if A.shape[2] != d:
-        raise DataError(f"the constraint is one of {A.shape[2]} actions, and the demonstrations have {d}")
-    if demonstrations.states.shape[1] == A.shape[2] == 3:
-        return _draw_in_space(ax, A, demonstrations)
-    ax = get_axes(ax)
-    if demonstrations.states.shape[1] == A.shape[2] == 2:
-        _draw_in_plane(ax, A, demonstrations)
-    else:
-        _draw_table(ax, A, demonstrations.action_names)
-    return ax
-
-
-def constraint_figure(learnt: LearntConstraint, demonstrations: Demonstrations) -> Figure:
-    """Draw how the motion is shared out among directions, and the rows of a constraint over the recorded states.
-
-    Parameters
-    ----------
-    learnt : ConstantConstraint or FeatureConstraint
-        A fitted constraint.
-    demonstrations : Demonstrations
-        What it was learnt from.
-
-    Returns
-    -------
-    Figure
-        With a panel of `shares_of_motion` and one of `constraint`.
-    """
-    figure = Figure(figsize=(10.0, 4.4), layout="constrained")
-    shares_of_motion(learnt, ax=figure.add_subplot(1, 2, 1))
-    space = demonstrations.states.shape[1] == demonstrations.actions.shape[1] == 3
-    constraint(learnt, demonstrations, ax=figure.add_subplot(1, 2, 2, projection="3d" if space else None))
-    return figure
-
-
-def _draw_in_space(ax: Any, A: np.ndarray, demonstrations: Demonstrations) -> Axes:
-    # Axes in space are a class of their own in matplotlib, which gives them no types.
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.figure(layout="constrained").add_subplot(projection="3d")
-    X, names = demonstrations.states, demonstrations.state_names
-    ax.scatter(*X[:: max(1, len(X) // SHOWN_POINTS)].T, s=5, color=RECORDED, alpha=0.5, linewidths=0)
-    picked = _thin(X)
+        raise DataError(f"the constraint is one of {A.shape[2]} actions, and the recordings have {d}")
+    velocities = find_velocities(demos.space, d)
+    in_space = coordinates is None and n == 3 and ax is None
+    shown = check_coordinates((0, 1, 2) if in_space else coordinates, n, ax)
+    own = [velocities[i] for i in shown]
+    is_small = n in (2, 3) and None not in own
+    if coordinates is None and not is_small:
+        ax = get_axes(ax)
+        _draw_table(ax, A, demos.action_names)
+        return ax
+    if None in own:
+        raise DataError(
+            "rows are drawn over states whose velocities are actions: choose others with coordinates="
+        )
+    ax = get_axes(ax, len(shown))
+    demonstrations(demos, coordinates=shown, ax=ax)
+    label_axes(ax, demos, shown)
+    places = demos.states[:, list(shown)]
+    # Rows have one length, so the cells have one side also where the axes' scales differ.
+    picked, spacing = spread_samples(places, is_square=True)
     for rows in A.swapaxes(0, 1):
-        arrows = align(rows)[picked]
-        ax.quiver(*X[picked].T, *arrows.T, length=ARROW_LENGTH * _extent(X), color=DIRECT, linewidth=1.0)
-    ax.set(xlabel=names[0], ylabel=names[1], zlabel=names[2], title="Rows on the recorded points")
-    ax.set_aspect("equal")
-    ax.locator_params(nbins=5)
+        arrows = pick_columns(align(rows)[picked], own)
+        draw_arrows(ax, places[picked], arrows, spacing, DIRECT, None, 1.0)
+    k = A.shape[1]
+    ax.set_title(f"{k} of {d} directions constrained", fontsize=10.5)
     return ax
 
 
-def _draw_in_plane(ax: Axes, A: np.ndarray, demonstrations: Demonstrations) -> None:
-    X, names = demonstrations.states, demonstrations.state_names
-    ax.plot(*X.T, ".", color=RECORDED, ms=2, alpha=0.4)
-    picked = _thin(X)
-    ax.quiver(
-        *X[picked].T, *align(A[:, 0])[picked].T, angles="xy", scale_units="xy",
-        scale=1 / (ARROW_LENGTH * _extent(X)), color=DIRECT, width=0.004,
-    )  # fmt: skip
-    label_plane(ax, (names[0], names[1]))
-    ax.set_title("Row on the recorded points")
-
-
-def _draw_table(ax: Axes, A: np.ndarray, action_names: tuple[str, ...]) -> None:
+def _draw_table(ax: Any, A: Array, action_names: Sequence[str]) -> None:
     image = ax.imshow(np.mean(A**2, axis=0), cmap="Blues", vmin=0, vmax=1, aspect="auto")
     ax.set_xticks(range(A.shape[2]), action_names, rotation=45, ha="right")
     ax.set_yticks(range(A.shape[1]), [f"row {j + 1}" for j in range(A.shape[1])])
-    ax.set_title("Mean squares of the rows")
-    ax.figure.colorbar(image, ax=ax)
-
-
-def _extent(X: np.ndarray) -> float:
-    return float(np.ptp(X, axis=0).max()) or 1.0
-
-
-def _thin(X: np.ndarray) -> slice:
-    return slice(None, None, max(1, len(X) // ARROWS))
+    ax.set_title("Mean squares of the rows", fontsize=10.5)
+    ax.figure.colorbar(image, ax=ax, label="share of the action in the row")

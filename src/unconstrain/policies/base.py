@@ -712,6 +712,15 @@ class Policy(RegressorMixin, BaseEstimator):
         """Of how many of them the projection was known."""
         return self.solution_.n_known
 
+    def _html_repr(self) -> str:
+        """Return what notebooks show: what was found out, above scikit-learn's diagram of the options."""
+        diagram: str = super()._html_repr()
+        if not self.__sklearn_is_fitted__():
+            return diagram
+        from unconstrain.policies.inferred import to_html
+
+        return to_html(self) + diagram
+
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.target_tags.single_output = True

@@ -1,6 +1,9 @@
 """What a policy has found out about its recordings, in sentences."""
 
+import numpy as np
+
 from unconstrain.fitting.inference import CONSTRAINED, FREE, SPEED
+from unconstrain.notebook import format_sentences, format_table
 from unconstrain.policies.base import Policy
 
 NOTHING_FOUND = "no contact was found in these recordings, so this is ordinary regression"
@@ -74,7 +77,7 @@ def describe_inferred(policy: Policy) -> str:
     if scaled:
         each = ", ".join(f"{value:.3g}" for value in policy.scale_)
         lines.append(
-            f"scale of the actions, in which errors and noise are measured: {each}; --scale says otherwise"
+            f"scale of the actions, in which errors and noise are measured: {each}; scale= says otherwise"
         )
     if policy.risk == "corrected":
         return "\n".join([*lines, f"noise: {policy.noise_:.3g} in {unit}"])
@@ -98,3 +101,35 @@ def describe_inferred(policy: Policy) -> str:
             found = NOTHING_MORE_FOUND if policy.n_known_constraints_ else NOTHING_FOUND
             lines.append(IN_DOUBT if is_in_doubt(policy) else found)
     return "\n".join(lines)
+
+
+def to_html(policy: Policy) -> str:
+    """Write what a policy has learnt in HTML, which notebooks show.
+
+    Parameters
+    ----------
+    policy : Policy
+        Fitted.
+
+    Returns
+    -------
+    str
+        HTML: a table, and what was inferred in sentences.
+    """
+    rows = [
+        ("states", policy.space_.words),
+        ("actions", str(policy.n_actions_)),
+        ("samples learnt from", f"{policy.n_samples_seen_:,}"),
+        ("risk", policy.risk),
+    ]
+    if policy.n_zero_actions_:
+        rows.append(("of them without motion", f"{policy.n_zero_actions_:,}"))
+    alpha = getattr(policy, "alpha_", np.nan)
+    if np.isfinite(alpha):
+        rows.append(("weight decay λ", f"{alpha:.3g}"))
+    if policy.determined_share_ is not None:
+        rows.append(("determined by the recordings", f"{policy.determined_share_:.0%}"))
+    if policy.stability_ is not None:
+        rows.append(("stabilised", "yes"))
+    name = type(policy).__name__
+    return format_table((name, "fitted"), rows) + format_sentences(describe_inferred(policy).splitlines())

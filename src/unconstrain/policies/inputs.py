@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from unconstrain.arrays import (
     check_actions,
     check_groups,
+    check_numbers,
     check_projections,
     check_samples,
     check_weights,
@@ -65,6 +66,52 @@ def unpack_demonstrations(
     if groups is None:
         groups = X.folds()
     return X.states, X.actions, groups, X.projections if projections is None else projections
+
+
+def as_demonstrations(
+    demos: ArrayLike | Demonstrations,
+    U: ArrayLike | None,
+    groups: ArrayLike | None,
+    *,
+    actions_needed: bool = True,
+) -> Demonstrations:
+    """Make demonstrations of states and actions, where they are none yet.
+
+    Parameters
+    ----------
+    demos : Demonstrations, or array_like of shape (N, n)
+        Recordings, or their states.
+    U : array_like of shape (N, d) or (N,), optional
+        Actions; None beside demonstrations.
+    groups : array_like of shape (N,), optional
+        Episodes, beside states.
+    actions_needed : bool
+        Whether states alone will not do; if they do, actions that are not given are zero.
+
+    Returns
+    -------
+    Demonstrations
+        Those given, or new ones.
+
+    Raises
+    ------
+    DataError
+        Actions or episodes are given beside demonstrations, actions are missing, or the arrays cannot be used.
+    """
+    if isinstance(demos, Demonstrations):
+        if U is not None or groups is not None:
+            raise DataError(
+                "demonstrations bring their own actions and episodes: give the demonstrations alone, or states and "
+                "actions"
+            )
+        return demos
+    states = check_numbers(demos, "states")
+    if U is None:
+        if actions_needed:
+            raise DataError("give the actions beside the states, X and U, or demonstrations in place of both")
+        U = np.zeros(states.shape)
+    actions = check_numbers(U, "actions")
+    return Demonstrations(states, actions[:, None] if actions.ndim == 1 else actions, groups)
 
 
 def check_input(

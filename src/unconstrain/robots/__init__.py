@@ -6,14 +6,16 @@ from unconstrain import lazy
 
 if TYPE_CHECKING:
     from unconstrain.errors import RobotError
+    from unconstrain.robots.hand import HandFeatures
     from unconstrain.robots.robot import Robot
     from unconstrain.robots.simulator import import_mujoco
     from unconstrain.robots.task import TaskConstraint
 
-__all__ = ["Robot", "RobotError", "TaskConstraint", "import_mujoco"]
+__all__ = ["HandFeatures", "Robot", "RobotError", "TaskConstraint", "import_mujoco"]
 
 _HOMES = {
     "unconstrain.errors": ("RobotError",),
+    "unconstrain.robots.hand": ("HandFeatures",),
     "unconstrain.robots.robot": ("Robot",),
     "unconstrain.robots.simulator": ("import_mujoco",),
     "unconstrain.robots.task": ("TaskConstraint",),

@@ -128,6 +128,9 @@ class Robot:
         except RobotError as error:
             raise RobotError(f"{Path(path).name}: {error}") from error
 
+    def __repr__(self) -> str:
+        return f"<robot of {self.n} joints: {', '.join(self.joints)}>"
+
     @property
     def n(self) -> int:
         """The number of joints that move."""

@@ -1,63 +1,31 @@
 """The program: a command an experiment, each with its own options."""
 
-import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from reproduction.experiments import EXPERIMENTS, find_experiment
+from reproduction.options import (
+    ADAPTIVE,
+    COUNT,
+    FEET,
+    FOLDER,
+    OUT,
+    PART,
+    PATH,
+    RECORDINGS,
+    ROBOT,
+    RUNNING,
+    Decorator,
+    add_options,
+    make_console,
+)
 from reproduction.real.parts import PARTS
+from reproduction.viewing import view
 from unconstrain.cli import reporting
 from unconstrain.cli.command import Command, Group, Interrupted
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-FOLDER = Path("out") / "reproduction"
-"""Where results go, a folder an experiment."""
-
-PATH = click.Path(path_type=Path)
-COUNT = click.IntRange(min=1)
-
-Decorator = Callable[[Callable[..., None]], Callable[..., None]]
-
-RUNNING = (
-    click.option(
-        "--trials", "--datasets", "trials", type=COUNT, help="How many data sets; by default as published."
-    ),
-    click.option("--jobs", type=COUNT, default=os.cpu_count() or 1, show_default=True, help="Processes."),
-)
-OUT = click.option(
-    "--out",
-    type=PATH,
-    help=f"Folder for results, by default {FOLDER}/EXPERIMENT. Finished trials are kept there, and the same command "
-    "goes on from them.",
-)
-ROBOT = (
-    click.option("--robot", type=PATH, help="Your robot, MJCF or URDF; by default our humanoid."),
-    click.option("--lock", default="", help="Joints of it to hold still, by commas."),
-    click.option("--hands", default="", help="Its hand frames, LEFT,RIGHT."),
-)
-FEET = click.option(
-    "--feet", default="", help="Its foot bodies, LEFT,RIGHT; without them its base stands still."
-)
-ADAPTIVE = click.option(
-    "--adaptive",
-    type=click.IntRange(min=0),
-    metavar="N",
-    help="How many of the data sets are learnt by risk adaptive as well, which takes 30 to 100 times as long; 0 leaves "
-    "its column out, by default it has the first 10 (toy: 20).",
-)
-RECORDINGS = click.option(
-    "--recordings",
-    type=PATH,
-    metavar="FOLDER",
-    help="Folder of the recorded surfaces; without it that part is left out.",
-)
-PART = click.option("--part", metavar="NAME", help="Only this part; a wrong name lists them.")
 
 
 @click.group(cls=Group, context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]})
@@ -65,20 +33,11 @@ def program() -> None:
     """Run the paper's experiments, and those that go beyond it."""
 
 
-def _add_options(*options: Decorator) -> Decorator:
-    def add(function: Callable[..., None]) -> Callable[..., None]:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return add
-
-
 def _experiment(name: str, *options: Decorator) -> None:
     """Add the command of an experiment, whose `reproduce` takes the options."""
 
     def run_experiment(out: Path | None, **given: Any) -> None:
-        console = _console()
+        console = make_console()
         outcome = find_experiment(name)(out or FOLDER / name, console=console, **given)
         from rich.markdown import Markdown
 
@@ -94,7 +53,7 @@ def _experiment(name: str, *options: Decorator) -> None:
         for path in (*outcome.figures, *outcome.files):
             console.print(f"written: {path}", soft_wrap=True)
 
-    decorated: Callable[..., None] = _add_options(*options, OUT)(run_experiment)
+    decorated: Callable[..., None] = add_options(*options, OUT)(run_experiment)
     help_ = EXPERIMENTS[name]
     program.add_command(click.command(name, cls=Command, help=help_, short_help=help_)(decorated))
 
@@ -166,49 +125,16 @@ _experiment(
 
 
 @click.command("all", cls=Command)
-@_add_options(*RUNNING, RECORDINGS)
+@add_options(*RUNNING, RECORDINGS)
 @click.option("--only", multiple=True, type=click.Choice(list(EXPERIMENTS)), help="Not all; may be repeated.")
 @click.option("--out", type=PATH, default=FOLDER, show_default=True, help="Folder, a folder an experiment.")
 def run_all(trials: int | None, jobs: int, recordings: Path | None, only: tuple[str, ...], out: Path) -> None:
     """All of them, and a page about them."""
     from reproduction.report import reproduce_all
 
-    console = _console()
+    console = make_console()
     page = reproduce_all(out, trials=trials, jobs=jobs, console=console, recordings=recordings, only=only)
     console.print(f"\nreport: {page}", soft_wrap=True)
-
-
-@click.command("view", cls=Command)
-@click.option(
-    "--policy",
-    type=PATH,
-    help="A saved policy over both hands' positions; without it one is learnt first.",
-)
-@click.option(
-    "--movements",
-    type=click.IntRange(min=5),
-    default=100,
-    show_default=True,
-    help="Constrained movements to learn from.",
-)
-@_add_options(*ROBOT, FEET)
-def view(policy: Path | None, movements: int, robot: Path | None, lock: str, hands: str, feet: str) -> None:
-    """Watch the grasp in MuJoCo's viewer, and stand in its way."""
-    from reproduction.grasp import viewer
-    from reproduction.grasp.trial import learn, make_demonstrator, record_training
-    from reproduction.plants.robot_choice import RobotChoice
-    from unconstrain.policies import load_policy
-
-    console = _console()
-    viewer.check_display()
-    learnt = None if policy is None else load_policy(policy)
-    demonstrator = make_demonstrator(RobotChoice.parse(robot, lock, hands, feet))
-    if learnt is None:
-        with console.status(f"learning from {movements} constrained movements"):
-            recording, _ = record_training(demonstrator, 0, movements)
-            learnt, _ = learn(recording.demonstrations, "inconsistency")
-    console.print(viewer.HELP)
-    viewer.view(demonstrator, learnt)
 
 
 @click.command("stability", cls=Command)
@@ -233,7 +159,7 @@ def stability(data: Path, repetitions: int, shape: tuple[str, ...], figure: Path
     from unconstrain import plot
     from unconstrain.plot.saving import check_suffix
 
-    console = _console()
+    console = make_console()
     check_suffix(figure)
     shapes = list(shape) or list_shapes(data)
     with console.status("learning") as status:
@@ -274,7 +200,7 @@ def real(data: Path, part: tuple[str, ...], repetitions: int, out: Path) -> None
 
     from reproduction.real.page import run_parts
 
-    console = _console()
+    console = make_console()
     outcomes = run_parts(data, part or list(PARTS), repetitions, out, console.print)
     for outcome in outcomes:
         console.print(Markdown(f"## {outcome.title}\n\n{outcome.table}"))
@@ -294,7 +220,7 @@ def cycles(data: Path) -> None:
     """
     from reproduction.cycles import measure_all, tabulate
 
-    console = _console()
+    console = make_console()
     with console.status("learning"):
         rows, refused = measure_all(data)
     console.print(tabulate(rows), soft_wrap=True)
@@ -341,11 +267,3 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except click.ClickException as error:
         reporting.say_error(error.format_message())
         return error.exit_code
-
-
-def _console() -> "Console":
-    """Make a console that takes text literally: brackets in names of files are no markup."""
-    from rich.console import Console
-
-    width = None if sys.stdout.isatty() else reporting.WIDTH
-    return Console(markup=False, highlight=False, width=width)

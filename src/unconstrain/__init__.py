@@ -13,7 +13,18 @@ from unconstrain import lazy
 TYPE_CHECKING = False  # as in typing, whose import would cost more than all else here
 
 if TYPE_CHECKING:
-    from unconstrain import constraints, datasets, errors, features, metrics, plot, robots, spaces, torch
+    from unconstrain import (
+        constraints,
+        datasets,
+        errors,
+        features,
+        metrics,
+        plot,
+        robots,
+        spaces,
+        torch,
+        viewer,
+    )
     from unconstrain.constraints.learnt import (
         ConstantConstraint,
         ConstraintChain,
@@ -41,6 +52,7 @@ if TYPE_CHECKING:
     from unconstrain.scaling import cluster as distributed
     from unconstrain.scaling.stream import fit_stream
     from unconstrain.selection import select_policy
+    from unconstrain.viewer import view
 
     __version__: str
 
@@ -86,6 +98,8 @@ __all__ = [
     "select_policy",
     "spaces",
     "torch",
+    "view",
+    "viewer",
 ]
 
 _HOMES = {
@@ -122,6 +136,7 @@ _HOMES = {
     "unconstrain.scaling.stream": ("fit_stream",),
     "unconstrain.selection": ("select_policy",),
     "unconstrain.version": ("__version__",),
+    "unconstrain.viewer": ("view",),
 }
 
 _NAMESPACES = {
@@ -137,6 +152,7 @@ _NAMESPACES = {
     "robots": "unconstrain.robots",
     "spaces": "unconstrain.spaces",
     "torch": "unconstrain.torch",
+    "viewer": "unconstrain.viewer",
 }
 
 if not TYPE_CHECKING:  # a checker that sees __getattr__ takes any name for one of ours

@@ -6,6 +6,8 @@ from pathlib import Path
 from unconstrain.errors import DataError
 
 GIGABYTE = 1e9
+NO_MATTER = 1e4
+"""Bytes of which nobody asks: to look how much is left takes longer than a step of a rollout."""
 CONTAINER = Path("/sys/fs/cgroup")
 """Where Linux says how much memory a container may take."""
 
@@ -28,6 +30,8 @@ def check_memory(n_bytes: float, what: str, remedy: str) -> None:
         If there is less memory than that. Where the operating system does not say how much there is, nothing is
         refused.
     """
+    if n_bytes < NO_MATTER:
+        return
     left = available_memory()
     if left is not None and n_bytes > left:
         needed, free = (

@@ -30,6 +30,7 @@ def test_help_lists_each_command_with_one_whole_line(run, monkeypatch):
         "diagnose",
         "constraints",
         "rollout",
+        "view",
         "convert",
     ]
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)

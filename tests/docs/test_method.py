@@ -1,4 +1,4 @@
-"""The figures of docs/method.md, and those of the README that come from docs/adaptive.md."""
+"""The figures of docs/method.md."""
 
 import contextlib
 import io
@@ -10,8 +10,6 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
-ADAPTIVE = (ROOT / "docs" / "adaptive.md").read_text(encoding="utf-8")
-README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def rows(table, keys, columns):
@@ -34,14 +32,6 @@ def test_the_page_states_what_the_code_prints():
     told = rows(table, 1, ("direct", "inconsistency", "adaptive"))
     # The last digits hang on the library of linear algebra.
     np.testing.assert_allclose(np.log(list(told.values())), np.log(printed), atol=np.log(1.5))
-
-
-def test_the_readme_states_what_the_page_on_inference_does():
-    ways = ("direct", "inconsistency", "adaptive", "told")
-    short = rows(README[README.index("| free share |") :].split("\n\n")[0], 2, ways)
-    whole = rows(ADAPTIVE[ADAPTIVE.index("| free share |") :].split("\n\n")[0], 2, ways)
-    assert len(short) == 9
-    assert short == {key: whole[key] for key in short}
 
 
 def test_a_feature_map_of_ones_own_finds_the_parameters():

@@ -45,6 +45,9 @@ PLACES = (
 SLOW = {"demo"}
 """Commands that take seconds whatever they are given: called with what is refused, and now and then."""
 
+ENDLESS = {"view"}
+"""Commands that serve a page until they are interrupted."""
+
 
 def stock(folder: Path) -> None:
     """Movements, and a policy of them."""
@@ -67,7 +70,8 @@ def case(rng: np.random.Generator, folder: Path, stock: Path) -> Case:
     os.symlink("policy.skops", folder / "link.skops")
     os.mkfifo(folder / "pipe.csv")
     os.symlink("loop.csv", folder / "loop.csv")
-    name = pick(rng, [n for n in program.commands if n not in SLOW or rng.random() < 0.2])
+    ending = [n for n in program.commands if n not in ENDLESS]
+    name = pick(rng, [n for n in ending if n not in SLOW or rng.random() < 0.2])
     command = program.commands[name]
     arguments, needs = [name], {"files": ["movements.csv"], "policy": ["policy.skops"]}
     spoils = rng.random() < 0.8

@@ -1,4 +1,4 @@
-"""Grasping: small data sets already reach the published figures; pictures, and the viewer's loop."""
+"""Grasping: small data sets already reach the published figures; pictures, and the loop of the page."""
 
 import importlib.metadata
 import json
@@ -11,7 +11,8 @@ from threadpoolctl import threadpool_limits
 
 import unconstrain as uc
 from reproduction import published
-from reproduction.grasp import experiment, figures, trial, video, viewer
+from reproduction.grasp import experiment, figures, trial, video
+from reproduction.grasp.interaction import FORESEEN_RATE, MIDDLE, NOTHING, Interaction
 from reproduction.plants.barrier import CLEARANCE
 from reproduction.plants.grasping import Attractor, Demonstrator, constrain
 from reproduction.plants.posture import demonstrate
@@ -181,21 +182,36 @@ def test_without_opengl_a_sentence_and_the_other_figures(
     assert "no OpenGL" in pictures.left_out[0]
 
 
-def test_the_viewer_s_loop_follows_keys(demonstrator, monkeypatch):
-    loop = viewer.Interaction(demonstrator, demonstrator.policy)
-    before = loop.body.hands
-    loop.press(viewer.UP)
-    loop.press(viewer.LEFT)
-    assert loop.width == pytest.approx(0.27)
-    assert loop.aside == pytest.approx(0.02)
-    loop.step()
-    assert np.linalg.norm(loop.body.hands - before) > 1e-3
-    loop.press(ord("B"))
-    assert loop.obstacle is None
-    loop.press(ord("R"))
-    loop.step()
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(viewer.sys, "platform", "linux")
-    with pytest.raises(uc.errors.UnconstrainError, match="no display"):
-        viewer.view(demonstrator, demonstrator.policy)
+def test_what_is_in_the_way_is_changed_while_the_robot_moves(demonstrator):
+    robot = Interaction(demonstrator, {"expert": demonstrator.policy, "still": lambda X: 0 * X})
+    before = robot.body.hands
+    robot.change(width=0.27, aside=0.02)
+    low, high = robot.obstacle.low[0], robot.obstacle.high[0]
+    np.testing.assert_allclose([high[1, 1], low[0, 1]], [0.02 - 0.135, 0.02 + 0.135])
+    assert robot.step() > 0.05
+    assert np.linalg.norm(robot.body.hands - before) > 1e-3
+    robot.change(kind=MIDDLE, width=0.3, aside=0.1)
+    np.testing.assert_allclose([robot.obstacle.low[0, 0, 1], robot.obstacle.high[0, 0, 1]], [-0.05, 0.25])
+    assert robot.change(kind=NOTHING, width=9.0).width == demonstrator.scene.span
+    assert robot.obstacle is None
+    robot.policy = "still"
+    assert robot.step() < 1e-3
+    robot.restart()
+    assert robot.seconds == 0.0
+    assert demonstrator.scene.admits(robot.body.hands)
+    with pytest.raises(uc.errors.UnconstrainError, match="'a moat' cannot be in the way"):
+        robot.change(kind="a moat")
+
+
+def test_the_way_foreseen_is_the_policy_s_behind_the_barrier(demonstrator, policies):
+    robot = Interaction(demonstrator, {"learnt": policies["inconsistency"]})
+    robot.change(width=0.1)
+    ways, held = robot.foresee()
+    np.testing.assert_allclose(ways[0], robot.body.hands)
+    steps = np.diff(ways, axis=0) * FORESEEN_RATE
+    wanted = policies["inconsistency"].predict(ways[:-1].reshape(-1, 6)).reshape(-1, 2, 3)
+    np.testing.assert_allclose(steps[~held[:-1]], wanted[~held[:-1]], atol=1e-9)
+    assert held.any(axis=0).all(), "the gap is too narrow for both hands"
+    assert (robot.obstacle.nearest(ways[:, 0])[0] > 0.5 * CLEARANCE).all()
+    with pytest.raises(uc.errors.PolicyError, match="mine was learnt over 2 states"):
+        Interaction(demonstrator, {"mine": uc.ParametricPolicy().fit(np.eye(2), np.eye(2))})

@@ -1,9 +1,11 @@
 """The program: what it prints, how it ends, and options that do not belong."""
 
 import signal
+import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -121,13 +123,17 @@ def test_mistakes_about_the_robot_are_told_before_the_first_trial(program, tmp_p
         assert not list(tmp_path.iterdir())
 
 
-def test_without_a_display_there_is_nothing_to_view(program, monkeypatch):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(sys, "platform", "linux")
-    code, _, err = program("view")
-    assert code == 2
-    assert "no display" in err
+def test_pages_are_not_begun_at_a_port_that_is_taken(program):
+    pytest.importorskip("viser")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        for experiment in ("grasp", "cycle"):
+            code, _, err = program("view", experiment, "--port", port)
+            assert code == 2
+            assert f"port {port}" in err
+            assert len(err.splitlines()) == 1
 
 
 def test_ctrl_c_ends_with_one_line_and_says_what_is_kept(tmp_path):
@@ -152,4 +158,19 @@ def test_ctrl_c_ends_with_one_line_and_says_what_is_kept(tmp_path):
     assert process.returncode == 130
     assert "of 200 are kept in" in out
     assert err.strip().splitlines()[-1] == "interrupted: finished trials are kept"
+    assert "Traceback" not in err
+
+
+def test_the_cycle_s_page_is_served_until_ctrl_c():
+    pytest.importorskip("viser")
+    command = [sys.executable, "-m", "reproduction", "view", "cycle", "--movements", "10", "--port", "0"]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        told = next(line for line in process.stdout if line.startswith("page: "))
+        with urllib.request.urlopen(told.removeprefix("page: ").strip(), timeout=10) as page:
+            assert page.status == 200
+    finally:
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
     assert "Traceback" not in err

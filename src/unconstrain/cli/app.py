@@ -15,6 +15,7 @@ from unconstrain.cli.evaluate import evaluate
 from unconstrain.cli.fit import fit
 from unconstrain.cli.inspect import inspect
 from unconstrain.cli.rollout import rollout
+from unconstrain.cli.view import view
 
 WIDTH = 100
 """Of the help, in columns, where the terminal has as many."""
@@ -39,7 +40,7 @@ def program() -> None:
     """Learn the policy behind constrained demonstrations."""
 
 
-for command in (demo, inspect, fit, evaluate, diagnose, constraints, rollout, convert):
+for command in (demo, inspect, fit, evaluate, diagnose, constraints, rollout, view, convert):
     program.add_command(command)
 
 

@@ -4,10 +4,9 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-
 INNER = {
-    "check_options", "finish", "held_for", "learn", "observe", "place", "prepare_covariance", "resume", "scaled", "solved",
-    "start",
+    "check_options", "finish", "held_for", "learn", "observe", "place", "prepare_covariance", "resume", "scaled",
+    "solved", "start",
 }  # fmt: skip
 """What streams, clusters and selection ask of a policy, and people do not."""
 

@@ -6,7 +6,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.arrays import check_number
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import UnconstrainError
 from unconstrain.stopping import Movement
 from unconstrain.viewer import camera, exporting, legend, server
 from unconstrain.viewer.controls import Controls
@@ -221,7 +223,7 @@ class Page:
         seconds : float
             From the start to the end.
         """
-        self.stage.seconds = max(float(seconds), 1e-3)
+        self.stage.seconds = max(check_number(seconds, "seconds", positive=False), 1e-3)
         self.controls.show_seconds(self.stage.seconds)
         self.follow()
 
@@ -350,7 +352,10 @@ class Page:
         self.path.mark(state)
         self.controls.time.value = min(seconds, self.controls.time.max)
         for listener in self._state_listeners:
-            listener(state)
+            try:
+                listener(state)
+            except Exception as error:  # it is not ours, and the time line goes on
+                self._fail(error)
 
     def say(self, note: str) -> None:
         """Say something on the page, once.
@@ -366,4 +371,5 @@ class Page:
             self.controls.notes.content = legend.describe_notes(self.notes)
 
     def _fail(self, error: Exception) -> None:
-        self.say(str(error))
+        told = isinstance(error, UnconstrainError)
+        self.say(str(error) if told else f"something failed, {type(error).__name__}: {error}")

@@ -48,6 +48,8 @@ class Controls:
             self.movements = gui.add_checkbox("Movements", True)
             self.movements.on_update(lambda event: page.movements.show(self.movements.value))
             self.arrows = gui.add_checkbox("Field: arrows", page.field.shows_arrows)
+            # Accelerations would need a velocity at every place.
+            self.arrows.visible = not isinstance(stage.policy.space_, SecondOrder)
             self.streams = gui.add_checkbox("Field: stream lines", page.field.shows_streams)
             for box in (self.arrows, self.streams):
                 box.on_update(lambda event: page.show_field(self.arrows.value, self.streams.value))

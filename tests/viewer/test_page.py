@@ -173,6 +173,12 @@ def test_many_samples_are_thinned_and_it_is_said(policy, monkeypatch):
     shown = samples.choose(policy, demos)
     assert len(shown.demos) <= 50
     assert f"of {len(demos)} samples one in" in shown.notes[0]
+    monkeypatch.setattr(samples, "MOST", 100)
+    short = demonstrate(50, random_state=0)
+    short = short.select(np.flatnonzero(np.arange(len(short)) % 40 < 4))
+    shown = samples.choose(policy, short)
+    assert "of 50 episodes one in" in shown.notes[0]
+    assert shown.joined.mean() > 0.7
 
 
 def test_other_coordinates_are_shown_in_a_scene_of_their_own():

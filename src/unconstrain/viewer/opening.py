@@ -125,7 +125,7 @@ def view(
         axes=axes,
         scenery=(seen, Frame.around(seen.place(X), in_metres=robot is not None)),
         start=X[0].copy(),
-        seconds=_duration(shown.demos),
+        seconds=_duration(shown.demos if demos is None else demos),
         interval=_interval(demos),
         under=under,
     )

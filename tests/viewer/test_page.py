@@ -223,6 +223,10 @@ def test_what_fails_is_said_and_the_time_line_goes_on(page):
     time.sleep(0.1)
     assert page.timeline.time != before
     assert "ValueError: &lt;b&gt;no&lt;/b&gt;" in page.controls.notes.content
+    # A number that is typed is sent as it is, also beyond its slider's range.
+    for typed, taken in ((-3.0, page.controls.seconds.min), (1e9, page.controls.seconds.max)):
+        page.controls.seconds.value = typed
+        assert page.stage.seconds == pytest.approx(taken)
     with pytest.raises(PolicyError, match="seconds must be a finite number"):
         page.set_seconds(float("nan"))
 

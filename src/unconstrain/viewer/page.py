@@ -60,8 +60,8 @@ class Page:
         self._is_under, self._anywhere = stage.under is not None, False
         self.movements, self.field, self.diagnosis = Movements(), Field(demos), Diagnosis(demos)
         self.surroundings, self.path = Surroundings(), Path(stage)
-        self._following = Newest(self._follow, self._fail)
-        self._drawing = Newest(self._draw, self._fail)
+        self._following = Newest(self._follow, self.report)
+        self._drawing = Newest(self._draw, self.report)
         self.obstacles = Obstacles(self.follow)
         self.start = Start(stage, self.drag)
         self.timeline = Timeline(self._at_time)
@@ -338,7 +338,7 @@ class Page:
                 part.draw(stage)
             except Exception as error:
                 if stage.scenery is scenery:  # otherwise it is drawn anew already
-                    self._fail(error)
+                    self.report(error)
         why_not = self.field.sureness(stage).why_not
         if why_not:
             self.say(f"opacity is by distance from recorded states only: {why_not}")
@@ -355,7 +355,7 @@ class Page:
             try:
                 listener(state)
             except Exception as error:  # it is not ours, and the time line goes on
-                self._fail(error)
+                self.report(error)
 
     def say(self, note: str) -> None:
         """Say something on the page, once.
@@ -370,6 +370,13 @@ class Page:
             self.controls.notes.visible = True
             self.controls.notes.content = legend.describe_notes(self.notes)
 
-    def _fail(self, error: Exception) -> None:
+    def report(self, error: Exception) -> None:
+        """Say on the page what failed.
+
+        Parameters
+        ----------
+        error : Exception
+            A mistake of the user's, which is a sentence, or of ours.
+        """
         told = isinstance(error, UnconstrainError)
         self.say(str(error) if told else f"something failed, {type(error).__name__}: {error}")

@@ -44,12 +44,12 @@ class Samples(NamedTuple):
             return None
         return np.argsort(first[label], kind="stable")
 
-    def select(self, rows: NDArray[Any]) -> "Samples":
+    def select(self, rows: NDArray[Any] | slice) -> "Samples":
         """Select some of the samples.
 
         Parameters
         ----------
-        rows : ndarray of int or bool
+        rows : ndarray of int or bool, or slice
             Which.
 
         Returns

@@ -185,6 +185,8 @@ class Accumulator:
         self.is_judged = alpha == "cv"
         self.compared: tuple[tuple[Belief, ...], ...] = ()
         self.total = Sums()
+        # By fold, how coarse the boxes of earlier samples became: those of later ones need not begin finer.
+        self._coarseness: list[int] = []
 
     def add(self, samples: Samples) -> None:
         """Add samples up.
@@ -483,11 +485,15 @@ class Accumulator:
         if not self.finds_region or self.unit is None:
             return ()
         counts = np.ones(len(samples.states), dtype=bool) if samples.weights is None else samples.weights > 0
-        Z, unit, known = self.model.lay_out(samples.states), self.unit, self.total.regions
+        Z, unit, reached = self.model.lay_out(samples.states), self.unit, self._coarseness
+        known = [0 if region is None else region.coarseness for region in self.total.regions]
 
         def find(rows: np.ndarray, k: int) -> Region:
-            before = known[k] if k < len(known) else None
-            return Region.of(Z[rows], unit, 0 if before is None else before.coarseness)
+            while len(reached) <= k:
+                reached.append(known[k] if k < len(known) else 0)
+            region = Region.of(Z if rows.all() else Z[rows], unit, reached[k])
+            reached[k] = max(reached[k], region.coarseness)
+            return region
 
         numbers = [0] if fold is None else range(1 + int(fold.max(initial=0)))
         inside = [counts if fold is None else counts & (fold == k) for k in numbers]

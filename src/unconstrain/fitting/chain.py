@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain import loops
+
 Floats = NDArray[np.float64]
 
 FREE, CONSTRAINED = 0, 1
@@ -169,6 +171,11 @@ def _sweep(steps: Floats) -> Floats:
     row that each begins with, then the rows within.
     """
     N = len(steps)
+    compiled = loops.load_for(N, "chain")
+    if compiled is not None:
+        swept = np.empty((N, 2))
+        compiled.sweep(steps, swept)
+        return swept
     length = max(1, int(np.sqrt(N)))
     n_pieces = -(-N // length)
     padded = np.empty((n_pieces * length, 2, 2))

@@ -17,6 +17,7 @@ References
 Dempster, Laird, Rubin, Maximum likelihood from incomplete data via the EM algorithm, J. R. Stat. Soc. B 39, 1977.
 """
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -34,6 +35,9 @@ from unconstrain.samples import Samples
 Floats = NDArray[np.float64]
 
 MOST_CORRELATED = 0.999
+
+SOME = 2**16
+"""Samples that are judged at a time, but for what it takes to end an episode."""
 
 
 @dataclass(frozen=True)
@@ -264,6 +268,32 @@ def infer(model: Model, belief: Belief, samples: Samples) -> Found:
         Of N samples.
     """
     return judge(model.evaluate(samples.states, belief.w), belief, samples)
+
+
+def infer_free(model: Model, belief: Belief, samples: Samples) -> Floats:
+    """Infer how surely each sample was free, some episodes at a time, whose arrays then stay in the processor's cache.
+
+    Parameters
+    ----------
+    model : Model
+        Whose parameters the belief has.
+    belief : Belief
+        So far.
+    samples : Samples
+        In the order of time within each episode.
+
+    Returns
+    -------
+    ndarray of shape (N,)
+        Probabilities.
+    """
+    N = len(samples.states)
+    begins = np.append(np.flatnonzero(episode_starts(samples)), N)
+    cuts = np.unique(begins[np.searchsorted(begins, np.arange(0, N + SOME, SOME)).clip(max=len(begins) - 1)])
+    free = np.empty(N)
+    for start, stop in itertools.pairwise(cuts.tolist()):
+        free[start:stop] = infer(model, belief, samples.select(slice(start, stop))).free
+    return free
 
 
 def judge(P: Floats, belief: Belief, samples: Samples) -> Found:

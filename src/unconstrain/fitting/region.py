@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain import loops
 from unconstrain.features.scaling import Scaling
 
 Array = NDArray[np.float64]
@@ -24,6 +25,9 @@ FINEST = 0.25
 
 MOST_BOXES = 512
 """Beyond so many, boxes become coarser."""
+
+SEVERAL = 8
+"""How many times as many boxes are told apart before they become coarser."""
 
 LARGEST = 2.0**62
 """Number of a box beyond which there is no telling it from the next."""
@@ -68,6 +72,13 @@ class Region:
         Region
             Of these states.
         """
+        compiled = loops.load_for(len(Z), "grid")
+        if compiled is not None:
+            rows = np.empty(SEVERAL * MOST_BOXES, dtype=np.int64)
+            found = compiled.first_rows(
+                Z, FINEST * unit, _shift(0, coarseness), 2.0**-coarseness, LARGEST, rows
+            )
+            Z = Z if found < 0 else Z[rows[:found]]
         with np.errstate(over="ignore"):
             boxes = np.clip(np.floor(Z / (FINEST * unit)), -LARGEST, LARGEST)
         return cls(unit, *_as_few(_coarser(boxes, 0, coarseness), coarseness))
@@ -120,8 +131,7 @@ class Region:
     @property
     def _middles(self) -> Array:
         """The middles of the boxes in units."""
-        moved = sum(2.0**level for level in range(self.coarseness) if _shift(level))
-        return (self.boxes + 0.5) * self._edge - moved * FINEST
+        return (self.boxes + 0.5) * self._edge - _shift(0, self.coarseness) * FINEST
 
 
 def find_unit(Z: Array, width: float | Array | None) -> Array:
@@ -183,16 +193,18 @@ def find_apart(regions: Sequence[Region | None]) -> float:
     )
 
 
-def _shift(coarseness: int) -> int:
-    """Return by how many boxes of this coarseness the next coarser ones begin earlier, so that zero is no wall."""
-    return 1 - coarseness % 2
+def _shift(coarseness: int, wanted: int) -> float:
+    """Return by how many boxes of a coarseness those of another begin earlier, so that zero is no wall."""
+    earlier = (2.0 ** (level - coarseness) for level in range(coarseness, wanted) if level % 2 == 0)
+    return sum(earlier, 0.0)
 
 
 def _coarser(boxes: NDArray[Any], coarseness: int, wanted: int) -> Array:
-    boxes = boxes.astype(np.float64)
-    for level in range(coarseness, wanted):
-        boxes = np.floor((boxes + _shift(level)) / 2.0)
-    return boxes
+    boxes = boxes.astype(np.float64, copy=False)
+    if wanted == coarseness:
+        return boxes
+    # Halving and rounding down level by level is one division, rounded down once.
+    return np.floor((boxes + _shift(coarseness, wanted)) * 2.0 ** (coarseness - wanted))
 
 
 def _as_few(boxes: Array, coarseness: int) -> tuple[NDArray[Any], int]:

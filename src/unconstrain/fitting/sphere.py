@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 SERIES_TERMS = 1000
 """More than the power series takes wherever the Bessel function itself underflows."""
 
-FAR = 1e3
-"""From κ = FAR max(ν, 1)² on five terms of the expansion for large κ are exact in double precision."""
+FAR = 40.0
+"""From κ = FAR + max(ν, 1)² / 2 on the expansion for large κ is exact in double precision, and faster."""
+
+TERMS = 20
+"""Of that expansion; fewer where κ is larger."""
+
+NEGLIGIBLE = 1e-18
 
 Floats = NDArray[np.float64]
 
@@ -181,13 +186,16 @@ def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
     log_mean, short = np.empty_like(kappa), np.empty_like(kappa)
     least = 1e-4 * np.sqrt(d)
     with np.errstate(under="ignore", divide="ignore", invalid="ignore"):
-        huge = kappa > FAR * max(nu, 1.0) ** 2
-        bessel = ive(nu, np.where(huge, 1.0, kappa))
-        fine = (bessel > 1e-290) & (kappa > least) & ~huge
-        log_mean[fine] = gammaln(d / 2) + nu * np.log(2 / kappa[fine]) + np.log(bessel[fine])
-        short[fine] = 1 - ive(nu + 1, kappa[fine]) / bessel[fine]
-    if not fine.all():
-        rest = ~fine & ~huge
+        huge = kappa > FAR + max(nu, 1.0) ** 2 / 2
+        near = np.flatnonzero(~huge & (kappa > least))
+        bessel = ive(nu, kappa[near])
+        usual = bessel > 1e-290
+        near, bessel = near[usual], bessel[usual]
+        log_mean[near] = gammaln(d / 2) + nu * np.log(2 / kappa[near]) + np.log(bessel)
+        short[near] = 1 - ive(nu + 1, kappa[near]) / bessel
+    rest = ~huge
+    rest[near] = False
+    if rest.any():
         value, slope = _series(nu, kappa[rest])
         log_mean[rest], short[rest] = value - kappa[rest], 1 - slope
     if huge.any():
@@ -220,9 +228,13 @@ def _series(nu: float, kappa: Floats) -> tuple[Floats, Floats]:
 def _hankel(nu: float, kappa: Floats) -> Floats:
     """Expand `sqrt(2πκ) exp(-κ) I_ν(κ) - 1` in powers of 1/κ."""
     total, term = np.zeros_like(kappa), np.ones_like(kappa)
-    for k in range(1, 6):
-        term = term * -(4 * nu**2 - (2 * k - 1) ** 2) / (8 * k * kappa)
+    inverse = 1 / kappa
+    for k in range(1, TERMS + 1):
+        term *= inverse
+        term *= -(4 * nu**2 - (2 * k - 1) ** 2) / (8 * k)
         total += term
+        if not np.abs(term).max(initial=0.0) > NEGLIGIBLE:
+            break
     return total
 
 

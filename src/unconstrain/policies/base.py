@@ -25,7 +25,7 @@ from unconstrain.constraints.nullspace import constrain
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import PolicyError
 from unconstrain.fitting.accumulator import Solution
-from unconstrain.fitting.contact import Belief, infer
+from unconstrain.fitting.contact import Belief, infer, infer_free
 from unconstrain.fitting.in_space import InSpace, in_units
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.observation import Observation, observe
@@ -420,9 +420,9 @@ class Policy(RegressorMixin, BaseEstimator):
         samples, _ = check_input(copy(self), X, y, groups, None, projections, first=False)
         samples, order = in_units(self.model_.scale, samples), self._order(samples)
         if order is None:
-            return infer(self.model_, belief, samples).free
+            return infer_free(self.model_, belief, samples)
         free = np.empty(len(order))
-        free[order] = infer(self.model_, belief, samples.select(order)).free
+        free[order] = infer_free(self.model_, belief, samples.select(order))
         return free
 
     def observe(self, samples: Samples) -> Observation:

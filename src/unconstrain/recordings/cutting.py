@@ -11,8 +11,8 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.blocks import Block, Loaded
 from unconstrain.recordings.pieces import Piece
 
-Load = Callable[[Sequence[Piece], int], Loaded]
-"""Makes samples of pieces, the first of which begins at a row."""
+Load = Callable[[Sequence[Piece], int, Piece | None], Loaded]
+"""Makes samples of pieces, given the number of their first row, and the last row before it, if there is one."""
 
 Labels = Callable[[Piece, int], NDArray[Any]]
 """Returns what must not be torn apart, (N,), of a piece that begins at a row."""
@@ -37,19 +37,23 @@ def cut_by_rows(
     """
     waiting: list[Piece] = []
     count = 0
+    before: Piece | None = None
     for piece in pieces:
         if waiting and count + len(piece.rows) > batch_rows:
-            yield Block(start, start + count, partial(load, waiting, start))
+            yield Block(start, start + count, partial(load, waiting, start, before))
+            before = _last_row(waiting)
             waiting, count, start = [], 0, start + count
         while len(piece.rows) > batch_rows:
             stop = start + batch_rows
-            yield Block(start, stop, partial(load, [piece.slice(0, batch_rows)], start))
+            block = [piece.slice(0, batch_rows)]
+            yield Block(start, stop, partial(load, block, start, before))
+            before = _last_row(block)
             piece, start = piece.slice(batch_rows, len(piece.rows) - batch_rows), stop
         if len(piece.rows):
             waiting.append(piece)
             count += len(piece.rows)
     if waiting:
-        yield Block(start, start + count, partial(load, waiting, start))
+        yield Block(start, start + count, partial(load, waiting, start, before))
 
 
 def cut_by_episodes(
@@ -83,6 +87,7 @@ def cut_by_episodes(
     current: Any = None
     here: set[Any] = set()  # episodes that wait
     gone: set[Any] = set()  # episodes of earlier blocks
+    before: Piece | None = None
     for piece in pieces:
         values = labels(piece, start + count)
         changes = (np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()
@@ -91,7 +96,8 @@ def cut_by_episodes(
             complete = count + at - used  # rows of episodes that have ended
             if complete >= batch_rows and (why is None or values[at] not in here):
                 block = [*waiting, piece.slice(used, at - used)] if at > used else waiting
-                yield Block(start, start + complete, partial(load, block, start))
+                yield Block(start, start + complete, partial(load, block, start, before))
+                before = _last_row(block)
                 waiting, count, start, used = [], 0, start + complete, at
                 gone |= here
                 here = set()
@@ -109,4 +115,9 @@ def cut_by_episodes(
         waiting.append(piece.slice(used, len(piece.rows) - used))
         count += len(piece.rows) - used
     if waiting:
-        yield Block(start, start + count, partial(load, waiting, start))
+        yield Block(start, start + count, partial(load, waiting, start, before))
+
+
+def _last_row(pieces: Sequence[Piece]) -> Piece | None:
+    last = next((piece for piece in reversed(pieces) if len(piece.rows)), None)
+    return None if last is None else last.slice(len(last.rows) - 1, 1)

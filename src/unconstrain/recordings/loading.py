@@ -54,7 +54,7 @@ def read_blocks(
         every = list(pieces)
         end = start + sum(len(piece.rows) for piece in every)
         if end > start:
-            yield Block(start, end, partial(load, every, start))
+            yield Block(start, end, partial(load, every, start, None))
     elif whole:
         yield from cut_by_episodes(
             pieces, start, batch_rows, whole, lambda piece, _: recording.labels([piece]), load
@@ -109,7 +109,9 @@ def _why_empty(recording: Recording, notes: Sequence[Note]) -> str:
     )
 
 
-def _load(recording: Recording, everything: bool, pieces: Sequence[Piece], start: int) -> Loaded:
+def _load(
+    recording: Recording, everything: bool, pieces: Sequence[Piece], start: int, before: Piece | None
+) -> Loaded:
     prepares = everything or recording.whole_episodes_for is not None
     if prepares:
         loaded = prepare(Portion(recording, pieces, start, everything))
@@ -124,7 +126,7 @@ def _load(recording: Recording, everything: bool, pieces: Sequence[Piece], start
         loaded = leave_out_slow(loaded, least)
     elif everything:
         loaded = replace(loaded, motion=Motion.of(loaded.samples.actions))
-    return replace(loaded, notes=(*loaded.notes, _tally(recording, loaded, pieces, start)))
+    return replace(loaded, notes=(*loaded.notes, _tally(recording, loaded, pieces, start, before)))
 
 
 def _take(recording: Recording, pieces: Sequence[Piece], start: int) -> Samples:
@@ -150,13 +152,15 @@ def _guesses(recording: Recording, pieces: Sequence[Piece]) -> tuple[Note, ...]:
     return tuple(Note("guess", recording.name, guess.decode()) for guess in guesses)
 
 
-def _tally(recording: Recording, loaded: Loaded, pieces: Sequence[Piece], start: int) -> Note:
+def _tally(
+    recording: Recording, loaded: Loaded, pieces: Sequence[Piece], start: int, before: Piece | None
+) -> Note:
     """Count samples and episodes of a block."""
     groups, time, name = loaded.samples.groups, loaded.time, recording.name
     assert groups is not None
     if _whole_for(recording, bool(loaded.episodes)) is None:
         values = recording.labels(pieces)
-        begins = int(np.sum(values[1:] != values[:-1])) + _begins(recording, values[:1], start)
+        begins = int(np.sum(values[1:] != values[:-1])) + _begins(recording, values[:1], start, before)
         return tally(name, len(groups), begins, None)
     codes, found = number_values(groups)
     # Fragments have names; numbers are those of the blocks that one long episode is cut into.
@@ -174,10 +178,12 @@ def _whole_for(recording: Recording, everything: bool) -> str | None:
     return recording.whole_episodes_for or ("time" if timed else None)
 
 
-def _begins(recording: Recording, first: NDArray[Any], start: int) -> int:
+def _begins(recording: Recording, first: NDArray[Any], start: int, before: Piece | None) -> int:
     """Return 1 if the row `start`, of this label (1,), is the first of its episode; 0 otherwise."""
     if not start:
         return 1
+    if before is not None:
+        return int(recording.labels([before])[0] != first[0])
     field = recording.roles.episode or recording.roles.state[0]
-    before = list(recording.read_pieces([field.key], start - 1, start))
-    return int(recording.labels(before)[0] != first[0])
+    read = list(recording.read_pieces([field.key], start - 1, start))
+    return int(recording.labels(read)[0] != first[0])

@@ -28,6 +28,9 @@ SAMPLED_ROWS = 2**16
 SAMPLED_GROUPS = 16
 """Row groups, at least, that a sample is drawn from: neighbouring rows resemble each other."""
 
+SAMPLED_IN_GROUP = 2**17
+"""Rows of each of them, the first, where there are as many: what lies behind them would have to be decoded too."""
+
 OPTIONAL = ("time", "policy", "projections", "forces", "free")
 """What demonstrations may have, in the order in which notes speak of them."""
 
@@ -111,7 +114,7 @@ class Tables:
         return X[:HEAD_ROWS], None if U is None else U[:HEAD_ROWS]
 
     def sample(self, n_rows: int, random_state: int | None) -> tuple[NDArray[Any], NDArray[Any] | None]:
-        """Read random rows, in order; all where there are no more. Of many row groups only some are read.
+        """Read random rows, in order; all where there are no more. Of many row groups the beginnings of some are read.
 
         Where the states of samples are others than lie in the files, they are prepared, and all of them are read.
         """
@@ -120,7 +123,7 @@ class Tables:
         if self.n_rows <= n_rows:
             return _joined([(each, list(each.read_pieces(each.plain_keys()))) for each in self.recordings])
         rng = np.random.default_rng(random_state)
-        groups = list(self._groups())
+        groups = self._beginnings(n_rows)
         chosen: list[int] = []
         available = 0
         for i in rng.permutation(len(groups)):
@@ -328,6 +331,16 @@ class Tables:
                 for size in file.row_groups:
                     yield recording, number, size, first
                     first += size
+
+    def _beginnings(self, n_rows: int) -> list[tuple[Recording, int, int, int]]:
+        """List row groups to draw so many rows from, of large ones their beginnings where these are enough."""
+        every = list(self._groups())
+        if len(every) < SAMPLED_GROUPS or any(
+            file.at_once for each in self.recordings for file in each.files
+        ):
+            return every
+        cut = [(each, number, min(size, SAMPLED_IN_GROUP), first) for each, number, size, first in every]
+        return cut if sum(size for _, _, size, _ in cut) >= n_rows else every
 
 
 def _joined(

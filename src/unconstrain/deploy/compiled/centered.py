@@ -5,12 +5,14 @@ each row is a one, so that a single product gives all sums and their norm.
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy import add, divide, exp, multiply, ndarray, subtract
+from numpy import add, divide, empty, exp, multiply, ndarray, subtract
 from numpy.typing import ArrayLike
 
+from unconstrain import loops
 from unconstrain.deploy.compiled.base import CompiledPolicy, check_shapes
 from unconstrain.errors import PolicyError
 from unconstrain.receptive import normalized_activations
@@ -26,6 +28,18 @@ class Centered(CompiledPolicy):
     """What blends over centres."""
 
     __slots__ = ()
+
+    def _in_one_call(self, x: ndarray, out: ndarray | None) -> ndarray | None:
+        """Act by the compiled loop; None where there is none, or it cannot."""
+        columns, scale, rows, loop = self._parts[:4]
+        if loop is None or (out is not None and out.shape != (self.n_actions,)):
+            return None
+        buffers = self._scratch.buffers
+        written = empty(self.n_actions) if out is None else out
+        try:
+            return written if loop(columns, scale, rows, x, buffers[2], buffers[1], written) else None
+        except TypeError:  # numbers of another kind than it was compiled for
+            return None if x.dtype == np.float64 else self(x.astype(np.float64), out)
 
     def _sums(self, x: ndarray) -> tuple[Any, ...]:
         """Return the buffers, with `Σ_i K_i rows_i` in the second, times a factor that all sums share."""
@@ -61,7 +75,11 @@ class Centered(CompiledPolicy):
         rows = self._rows(arrays)
         rows = np.column_stack([rows, np.ones(len(rows))])
         scale = -0.5 / arrays["width"] ** 2
-        return np.ascontiguousarray(arrays["centers"].T), scale, np.ascontiguousarray(rows)
+        return np.ascontiguousarray(arrays["centers"].T), scale, np.ascontiguousarray(rows), self._loop()
+
+    def _loop(self) -> Callable[..., bool] | None:
+        """Return the step as one compiled call, where there is one."""
+        return None
 
     @abstractmethod
     def _rows(self, arrays: dict[str, ndarray]) -> ndarray:
@@ -104,6 +122,9 @@ class RadialBasis(Centered):
         """Act; see `CompiledPolicy`."""
         if type(x) is not ndarray or x.shape != self._shape:
             return self._otherwise(x, out)
+        done = self._in_one_call(x, out)
+        if done is not None:
+            return done
         _, sums, _, actions = self._sums(x)
         try:
             return divide(actions, sums[-1], out)
@@ -132,6 +153,10 @@ class RadialBasis(Centered):
 
     def _rows(self, arrays: dict[str, ndarray]) -> ndarray:
         return arrays["weights"].T
+
+    def _loop(self) -> Callable[..., bool] | None:
+        compiled = loops.load("blend")
+        return None if compiled is None else compiled.radial
 
     def _buffers(self) -> tuple[ndarray, ...]:
         differences, sums, activations = super()._buffers()
@@ -167,6 +192,9 @@ class LocallyLinear(Centered):
         """Act; see `CompiledPolicy`."""
         if type(x) is not ndarray or x.shape != self._shape:
             return self._otherwise(x, out)
+        done = self._in_one_call(x, out)
+        if done is not None:
+            return done
         _, sums, _, coef, intercept = self._sums(x)
         try:
             out = coef.dot(x, out)
@@ -207,6 +235,10 @@ class LocallyLinear(Centered):
     def _rows(self, arrays: dict[str, ndarray]) -> ndarray:
         return np.column_stack([arrays["coef"].reshape(len(arrays["coef"]), -1), arrays["intercept"]])
 
+    def _loop(self) -> Callable[..., bool] | None:
+        compiled = loops.load("blend")
+        return None if compiled is None else compiled.local
+
     def _buffers(self) -> tuple[ndarray, ...]:
         differences, sums, activations = super()._buffers()
         d, n = self.n_actions, self.n_states
@@ -243,7 +275,7 @@ class Potential(Centered):
         if type(x) is not ndarray or x.shape != self._shape:
             return self._otherwise(x, out)
         _, sums, _, pulls, centre = self._sums(x)
-        total, rate = sums[-1], self._parts[3]
+        total, rate = sums[-1], self._parts[4]
         try:
             out = multiply(centre, sums[-2] / total, out)
             subtract(out, pulls, out)
@@ -276,7 +308,7 @@ class Potential(Centered):
     def _many(self, X: ndarray) -> ndarray:
         sums = self._blend(X) @ self._parts[2]
         n = self.n_states
-        return (sums[:, -2, None] * sums[:, n : 2 * n] - sums[:, :n]) * self._parts[3]
+        return (sums[:, -2, None] * sums[:, n : 2 * n] - sums[:, :n]) * self._parts[4]
 
 
 def _widths(width: ArrayLike, centers: ArrayLike) -> ArrayLike:

@@ -5,8 +5,11 @@ of H only d(d+1)/2 · M(M+1)/2 differ, and they are the entries of one matrix pr
 times distinct products of features. Any other features are summed as `VᵀV`. No N x P matrix is ever held.
 """
 
+from types import ModuleType
+
 import numpy as np
 
+from unconstrain import loops
 from unconstrain.features.base import Features, FullBasis
 from unconstrain.fitting.kernels.blocks import (
     SAMPLES_IN_PIECE,
@@ -15,9 +18,9 @@ from unconstrain.fitting.kernels.blocks import (
     sum_over_blocks,
     working_space,
 )
-from unconstrain.fitting.kernels.products import distinct_products, n_pairs, unfold
+from unconstrain.fitting.kernels.products import distinct_products, n_pairs, pairs, unfold
 from unconstrain.fitting.moments import Moments
-from unconstrain.fitting.observation import Observation
+from unconstrain.fitting.observation import AlongMotion, Observation
 
 # Numbers of 8 bytes in the widest array of a block. Products are used as soon as they are made, so they should stay
 # in a core's own cache; in VᵀV the product's own overhead counts, and is spread over more rows.
@@ -26,6 +29,11 @@ ROWS_IN_BLOCK = 2**21
 
 # A product of at most so many entries is narrow, and is taken in pieces of SAMPLES_IN_PIECE samples.
 NARROW = 2**12
+
+# Samples whose basis is computed at a time for the compiled loops.
+ROWS_OF_TILES = 2**12
+
+NOTHING = np.empty(0)
 
 
 def moments(
@@ -57,6 +65,10 @@ def moments(
     M, d, k = features.basis(X[:1]).shape[1], observation.n_actions, observation.n_rows
     # Products halve the arithmetic; they pay as long as making them is no more work than making V.
     if k > 1 or n_pairs(M) + n_pairs(d) <= 2 * d * M:
+        if isinstance(observation, AlongMotion) and n_pairs(M) * n_pairs(d) <= NARROW:
+            compiled = loops.load_for(len(X), "moments")
+            if compiled is not None:
+                return of_tiles(compiled, features, X, observation, weights)
         return of_products(features, X, observation, weights)
     return of_rows(features, X, observation, weights)
 
@@ -98,6 +110,49 @@ def of_products(
     return Moments(
         unfold(products, M, d), g.reshape(-1, 1), *_squares_and_weight(observation, weights), len(X)
     )
+
+
+def of_tiles(
+    compiled: ModuleType,
+    features: FullBasis,
+    X: np.ndarray,
+    observation: AlongMotion,
+    weights: np.ndarray | None = None,
+) -> Moments:
+    """Sum moments as `of_products` does, in compiled loops that make products and use them tile by tile.
+
+    Parameters
+    ----------
+    compiled : module
+        `loops.moments`.
+    features : FullBasis
+        Fitted.
+    X : ndarray of shape (N, n)
+        States.
+    observation : AlongMotion
+        Of N samples.
+    weights : ndarray of shape (N,), optional
+        Weight of each sample, 1 by default.
+
+    Returns
+    -------
+    Moments
+        Of N samples.
+    """
+    M, d = features.basis(X[:1]).shape[1], observation.n_actions
+    factors = pairs(M), pairs(d)
+
+    def add(block: slice, totals: Totals) -> None:
+        part = observation[block]
+        omega = NOTHING if weights is None else weights[block]
+        compiled.add_along_motion(
+            features.basis(X[block]).T, part.actions.T, part.inverse, omega, *factors, *totals
+        )
+
+    shapes = [(_fours(n_pairs(M)), _fours(n_pairs(d))), (_fours(d), _fours(M))]
+    products, g = sum_over_blocks(len(X), ROWS_OF_TILES, shapes, add)
+    H = unfold(products[: n_pairs(M), : n_pairs(d)], M, d)
+    return Moments(H, g[:d, :M].reshape(-1, 1), *_squares_and_weight(observation, weights), len(X))
 
 
 def of_whole_actions(
@@ -182,6 +237,11 @@ def of_rows(
 
     H, g = sum_over_blocks(len(X), rows_in_block(ROWS_IN_BLOCK, P), [(P, P), (P, 1)], add)
     return Moments(H, g, *_squares_and_weight(observation, weights), len(X))
+
+
+def _fours(length: int) -> int:
+    """Round up to a multiple of four."""
+    return -(-length // 4) * 4
 
 
 def _narrow(A: np.ndarray, B: np.ndarray) -> np.ndarray:

@@ -77,7 +77,7 @@ class Parquet(OneFile):
         order: list[int] | None = None
         with damage_named(self.file.shown, "a Parquet file"), self._open() as opened:
             batches = opened.iter_batches(DECODED, row_groups=groups, columns=names, use_threads=self.threads)
-            while (rows := next(batches, None)) is not None:
+            while at < stop and (rows := next(batches, None)) is not None:
                 rows = _flat(rows)
                 if order is None:
                     order = self._order(rows.schema, columns)
@@ -87,7 +87,7 @@ class Parquet(OneFile):
                 if high > low:
                     rows = rows if order == list(range(rows.num_columns)) else rows.select(order)
                     yield first + low, rows if (low, high) == (0, length) else rows.slice(low, high - low)
-        if at != bounds[groups[-1] + 1]:
+        if at < min(stop, int(bounds[groups[-1] + 1])):
             raise DataError(f"{self.file.shown} is damaged: rows are missing from it; write it again")
 
     def in_one_thread(self) -> "Parquet":

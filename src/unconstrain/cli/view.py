@@ -1,5 +1,6 @@
 """`unconstrain view`: a policy and its recordings in the browser."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -133,7 +134,12 @@ def view(
 
 
 def _check_rerun(
-    rerun: Path, policy: Path, recorded: recordings.Recorded, page_only: dict[str, object], *, overwrite: bool
+    rerun: Path,
+    policy: Path,
+    recorded: recordings.Recorded,
+    page_only: Mapping[str, object],
+    *,
+    overwrite: bool,
 ) -> None:
     from unconstrain.errors import DataError
     from unconstrain.viewer.rerun_log import check_suffix, import_rerun

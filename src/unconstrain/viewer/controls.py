@@ -1,6 +1,7 @@
 """What is shown, by checkboxes and dropdowns; and the time line, obstacles and files."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,12 +149,12 @@ class Controls:
                     name, low, max(high, low + step), step, float(np.clip(start[k], low, high))
                 )
                 slider.visible = k not in stage.coordinates.which
-                self._react(slider, lambda event, k=k, slider=slider: self._moved(event, k, _within(slider)))
+                self._react(slider, partial(self._moved, k, slider))
                 self.others.append(slider)
 
-    def _moved(self, event: Any, k: int, value: float) -> None:
+    def _moved(self, k: int, slider: Any, event: Any) -> None:
         if event.client is not None:
-            self.page.move_start(k, value)
+            self.page.move_start(k, _within(slider))
 
     def _add_files(self) -> None:
         gui = self.gui

@@ -1,5 +1,6 @@
 """The page and its life."""
 
+import atexit
 import threading
 from collections.abc import Callable
 
@@ -70,6 +71,8 @@ class Page:
         camera.look(stage)
         self.redraw()
         self.follow()
+        # Threads that draw when a program ends would complain that the server is gone.
+        atexit.register(self.close)
 
     @property
     def url(self) -> str:
@@ -93,6 +96,7 @@ class Page:
         if self._closed.is_set():
             return
         self._closed.set()
+        atexit.unregister(self.close)
         self.timeline.close()
         self._following.close()
         self._drawing.close()

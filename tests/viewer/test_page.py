@@ -14,7 +14,7 @@ from unconstrain.limit_cycle import demonstrate
 from unconstrain.viewer import exporting
 from unconstrain.viewer.following import choose_steps
 from unconstrain.viewer.newest import Newest
-from unconstrain.viewer.obstacles import BOTH, PLANE
+from unconstrain.viewer.obstacles import BOTH, BOX, PLANE
 
 
 def test_the_newest_is_worked_on_and_what_waits_longer_is_dropped():
@@ -126,7 +126,11 @@ def test_files_hold_what_is_seen(page, tmp_path):
         ),
         (DataError, "demos= must be Demonstrations", {"demos": np.eye(2)}),
         (DataError, "two or three different ones of x1, x2", {"coordinates": [0, 5]}),
+        (DataError, "two or three different ones of x1, x2", {"coordinates": ["x1", "x2"]}),
         (DataError, "rows of 2 numbers", {"constraint": [[1.0, 0.0, 0.0]]}),
+        (DataError, "rows of 2 numbers", {"constraint": "plane"}),
+        (DataError, "lock= is of a robot: name its file with robot=", {"lock": ["joint"]}),
+        (UnconstrainError, "'999.1.1.1' is no address of this computer", {"host": "999.1.1.1"}),
         (PolicyError, "port must be a whole number", {"port": -1}),
         (PolicyError, "a policy of unconstrain, got int", {"policy": 3}),
     ],
@@ -169,6 +173,12 @@ def test_many_samples_are_thinned_and_it_is_said(policy, monkeypatch):
     shown = samples.choose(policy, demos)
     assert len(shown.demos) <= 50
     assert f"of {len(demos)} samples one in" in shown.notes[0]
+    monkeypatch.setattr(samples, "MOST", 100)
+    short = demonstrate(50, random_state=0)
+    short = short.select(np.flatnonzero(np.arange(len(short)) % 40 < 4))
+    shown = samples.choose(policy, short)
+    assert "of 50 episodes one in" in shown.notes[0]
+    assert shown.joined.mean() > 0.7
 
 
 def test_other_coordinates_are_shown_in_a_scene_of_their_own():
@@ -190,6 +200,46 @@ def test_other_coordinates_are_shown_in_a_scene_of_their_own():
         assert page.stage.start[2] == pytest.approx(page.stage.frame.centre[0] + 0.5 / page.stage.frame.scale)
         np.testing.assert_allclose(page.stage.start[[1, 3]], [3.0, held[3]])
         assert page.notes == []
+    finally:
+        page.close()
+
+
+def test_a_box_that_was_shown_before_is_forgotten_with_its_coordinates(page):
+    for chosen in (BOX, "nothing"):
+        page.put_in_the_way(chosen)
+    page.show_coordinates([1, 0])
+    assert page.settle()
+    assert page.notes == []
+
+
+def test_what_fails_is_said_and_the_time_line_goes_on(page):
+    def fail(state):
+        raise ValueError("<b>no</b>")
+
+    page.on_state(fail)
+    page.timeline.play()
+    time.sleep(0.1)
+    before = page.timeline.time
+    time.sleep(0.1)
+    assert page.timeline.time != before
+    assert "ValueError: &lt;b&gt;no&lt;/b&gt;" in page.controls.notes.content
+    # A number that is typed is sent as it is, also beyond its slider's range.
+    for typed, taken in ((-3.0, page.controls.seconds.min), (1e9, page.controls.seconds.max)):
+        page.controls.seconds.value = typed
+        assert page.stage.seconds == pytest.approx(taken)
+    with pytest.raises(PolicyError, match="seconds must be a finite number"):
+        page.set_seconds(float("nan"))
+
+
+def test_names_are_no_html_and_one_sample_is_enough(policy, demos):
+    named = uc.Demonstrations(demos.states[:1], demos.actions[:1], state_names=["<b>x</b>", "y"])
+    page = uc.view(policy, named, port=0)
+    try:
+        page.show_diagnosis(True)
+        assert page.settle()
+        assert "&lt;b&gt;x&lt;/b&gt;" in page.controls.ending.content
+        assert page.notes == []
+        assert "Determined" in page.diagnosis.words
     finally:
         page.close()
 

@@ -1,5 +1,6 @@
 """`unconstrain view`: a policy and its recordings in the browser."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -102,7 +103,8 @@ def view(
     if rerun is None:
         server.check_port(host, port)  # before minutes of reading
     else:
-        _check_rerun(rerun, policy, recorded, robot, overwrite=overwrite)
+        page_only = {"robot": robot, "site": site, "lock": lock}
+        _check_rerun(rerun, policy, recorded, page_only, overwrite=overwrite)
     learnt = trusting.load(policy, trusted)
     with working("reading"):
         recorded = recorded.like(getattr(learnt, "recording_", None))
@@ -132,14 +134,21 @@ def view(
 
 
 def _check_rerun(
-    rerun: Path, policy: Path, recorded: recordings.Recorded, robot: Path | None, *, overwrite: bool
+    rerun: Path,
+    policy: Path,
+    recorded: recordings.Recorded,
+    page_only: Mapping[str, object],
+    *,
+    overwrite: bool,
 ) -> None:
     from unconstrain.errors import DataError
     from unconstrain.viewer.rerun_log import check_suffix, import_rerun
 
     check_suffix(rerun)
-    if robot is not None:
-        raise DataError("robot= is for the page, and rerun= writes states as they are: leave one of them out")
+    for name in (name for name, given in page_only.items() if given):
+        raise DataError(
+            f"{name}= is for the page, and rerun= writes states as they are: leave one of them out"
+        )
     outputs.check_outputs([policy, *recorded.files], {"rerun": rerun}, overwrite=overwrite)
     import_rerun()
 
@@ -163,6 +172,10 @@ def _positions(text: str, names: tuple[str, ...]) -> list[int]:
     unknown = [name for name in wanted if name not in names]
     if unknown:
         raise DataError(f"there is no state {', '.join(unknown)} for shown=: there are {', '.join(names)}")
+    if len(set(wanted)) < len(wanted) or len(wanted) > 3:
+        raise DataError(
+            f"shown= is two or three different states, not {text!r}: there are {', '.join(names)}"
+        )
     return [names.index(name) for name in wanted]
 
 

@@ -202,6 +202,8 @@ class Planner:
     ) -> np.ndarray:
         """Compute the gains (R,) of one model, by what movements show (R, T, P) and what that counts in it (R, T)."""
         gains, reached = np.zeros(len(V)), np.flatnonzero(weight.max(axis=1) > NEGLIGIBLE)
+        if not len(reached):
+            return gains
         noise *= V.shape[1] / self.length
         K, S = _project(V[reached] * np.sqrt(weight[reached])[..., None], covariance, noise)
         if criterion == "D":

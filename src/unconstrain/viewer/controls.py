@@ -1,5 +1,7 @@
 """What is shown, by checkboxes and dropdowns; and the time line, obstacles and files."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,15 +46,17 @@ class Controls:
         with gui.add_folder("Shown"):
             if len(stage.policies) > 1:
                 self.policy = gui.add_dropdown("Policy", tuple(stage.policies), initial_value=stage.name)
-                self.policy.on_update(lambda event: page.show_policy(self.policy.value))
+                self._react(self.policy, lambda event: page.show_policy(self.policy.value))
             self.movements = gui.add_checkbox("Movements", True)
-            self.movements.on_update(lambda event: page.movements.show(self.movements.value))
+            self._react(self.movements, lambda event: page.movements.show(self.movements.value))
             self.arrows = gui.add_checkbox("Field: arrows", page.field.shows_arrows)
+            # Accelerations would need a velocity at every place.
+            self.arrows.visible = not isinstance(stage.policy.space_, SecondOrder)
             self.streams = gui.add_checkbox("Field: stream lines", page.field.shows_streams)
             for box in (self.arrows, self.streams):
-                box.on_update(lambda event: page.show_field(self.arrows.value, self.streams.value))
+                self._react(box, lambda event: page.show_field(self.arrows.value, self.streams.value))
             self.unknown = gui.add_checkbox("What is not determined", False)
-            self.unknown.on_update(lambda event: page.show_diagnosis(self.unknown.value))
+            self._react(self.unknown, lambda event: page.show_diagnosis(self.unknown.value))
             self.diagnosis = gui.add_html("", visible=False)
             if isinstance(stage.coordinates, Picked) and len(stage.axes.names) > 1:
                 self._add_axes()
@@ -77,35 +81,35 @@ class Controls:
                 page.show_coordinates(picked)
 
         for each in self.axes:
-            each.on_update(pick)
+            self._react(each, pick)
         self.through = gui.add_dropdown("Arrows at", (field.RECORDED, field.HELD))
-        self.through.on_update(lambda event: page.show_through(self.through.value))
+        self._react(self.through, lambda event: page.show_through(self.through.value))
 
     def _add_rollout(self) -> None:
         page, gui = self.page, self.gui
         with gui.add_folder("Rollout"):
             self.seconds = gui.add_slider("Lasts (s)", *_range(page.stage.seconds), page.stage.seconds)
-            self.seconds.on_update(lambda event: page.set_seconds(self.seconds.value))
+            self._react(self.seconds, lambda event: page.set_seconds(_within(self.seconds)))
             self.obstacles = gui.add_dropdown(
                 "In its way", (obstacles.NOTHING, obstacles.PLANE, obstacles.BOX, obstacles.BOTH)
             )
             # A barrier takes away velocity, and the actions of these are accelerations.
             self.obstacles.visible = not isinstance(page.stage.policy.space_, SecondOrder)
-            self.obstacles.on_update(lambda event: page.put_in_the_way(self.obstacles.value))
+            self._react(self.obstacles, lambda event: page.put_in_the_way(self.obstacles.value))
             side = page.obstacles.side_in_units(page.stage)
             self.side = gui.add_slider("Box side", *_range(side), side, visible=False)
-            self.side.on_update(lambda event: page.resize_box(self.side.value))
+            self._react(self.side, lambda event: page.resize_box(_within(self.side)))
             if page.stage.under is not None:
                 self.under = gui.add_checkbox("Under the given constraint", True)
-                self.under.on_update(lambda event: page.follow_under(self.under.value))
+                self._react(self.under, lambda event: page.follow_under(self.under.value))
             self.anywhere = gui.add_checkbox(ANYWHERE, False)
-            self.anywhere.on_update(lambda event: page.lead_anywhere(self.anywhere.value))
+            self._react(self.anywhere, lambda event: page.lead_anywhere(self.anywhere.value))
             self.time = gui.add_slider("Time (s)", 0.0, page.stage.seconds, page.stage.seconds / 200.0, 0.0)
-            self.time.on_update(self._sought)
+            self._react(self.time, self._sought)
             self.play = gui.add_button_group("Play", ("play", "pause", "to start"))
-            self.play.on_click(lambda event: page.control_time(event.target.value))
+            self._react(self.play, lambda event: page.control_time(event.target.value))
             self.speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1")
-            self.speed.on_update(lambda event: setattr(page.timeline, "speed", float(self.speed.value)))
+            self._react(self.speed, lambda event: setattr(page.timeline, "speed", float(self.speed.value)))
             self.ending = gui.add_html("")
 
     def show_axes(self, which: list[int]) -> None:
@@ -128,7 +132,7 @@ class Controls:
 
     def _sought(self, event: Any) -> None:
         if event.client is not None:  # not when the time line itself moved it
-            self.page.timeline.go_to(self.time.value)
+            self.page.timeline.go_to(_within(self.time))
 
     def _add_others(self) -> None:
         """Add a slider for each number that is not shown, by which the start is moved along it."""
@@ -145,35 +149,57 @@ class Controls:
                     name, low, max(high, low + step), step, float(np.clip(start[k], low, high))
                 )
                 slider.visible = k not in stage.coordinates.which
-                slider.on_update(lambda event, k=k, slider=slider: self._moved(event, k, slider.value))
+                self._react(slider, partial(self._moved, k, slider))
                 self.others.append(slider)
 
-    def _moved(self, event: Any, k: int, value: float) -> None:
+    def _moved(self, k: int, slider: Any, event: Any) -> None:
         if event.client is not None:
-            self.page.move_start(k, value)
+            self.page.move_start(k, _within(slider))
 
     def _add_files(self) -> None:
         gui = self.gui
         with gui.add_folder("Save", expand_by_default=False):
             self.png, self.svg = gui.add_button("Picture (PNG)"), gui.add_button("Picture (SVG)")
             self.csv = gui.add_button("Rollout (CSV)")
-        page = self.page
+        self._react(self.png, self._save_png)
+        self._react(self.svg, self._save_svg)
+        self._react(self.csv, self._save_csv)
 
-        @self.png.on_click
-        def _(event: Any) -> None:
-            render = event.client.get_render(*RENDERED, transport_format="png", timeout=60.0)
-            event.client.send_file_download("view.png", exporting.png(render), save_immediately=True)
+    def _save_png(self, event: Any) -> None:
+        render = event.client.get_render(*RENDERED, transport_format="png", timeout=60.0)
+        self._send(event.client, "view.png", exporting.png(render))
 
-        @self.svg.on_click
-        def _(event: Any) -> None:
-            event.client.send_file_download("view.svg", page.draw_svg(), save_immediately=True)
+    def _save_svg(self, event: Any) -> None:
+        self._send(event.client, "view.svg", self.page.draw_svg())
 
-        @self.csv.on_click
-        def _(event: Any) -> None:
-            if page.stage.movement is not None:
-                event.client.send_file_download(
-                    "rollout.csv", exporting.csv(page.stage.movement), save_immediately=True
-                )
+    def _save_csv(self, event: Any) -> None:
+        if self.page.stage.movement is not None:
+            self._send(event.client, "rollout.csv", exporting.csv(self.page.stage.movement))
+
+    def _send(self, client: Any, name: str, content: bytes) -> None:
+        if self._is_there(client):
+            client.send_file_download(name, content, save_immediately=True)
+
+    def _is_there(self, client: Any) -> bool:
+        """Say whether a browser has not been closed meanwhile."""
+        return client.client_id in self.page.stage.server.get_clients()
+
+    def _react(self, control: Any, react: Callable[[Any], None]) -> None:
+        """Call a function when a control is used. What it raises is said on the page, not in the terminal."""
+
+        def guarded(event: Any) -> None:
+            try:
+                react(event)
+            except Exception as error:  # the page goes on
+                if event.client is None or self._is_there(event.client):
+                    self.page.report(error)
+
+        (control.on_click if hasattr(control, "on_click") else control.on_update)(guarded)
+
+
+def _within(slider: Any) -> float:
+    """Return the number of a slider within its range, which a number that is typed need not be in."""
+    return float(np.clip(slider.value, slider.min, slider.max))
 
 
 def _range(usual: float) -> tuple[float, float, float]:

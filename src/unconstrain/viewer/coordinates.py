@@ -113,12 +113,13 @@ class Picked:
     """
 
     def __init__(self, axes: Axes, which: Sequence[int]) -> None:
-        self.axes, self.which = axes, [int(each) for each in which]
-        few = len(self.which) not in (1, 2, 3) or len(set(self.which)) < len(self.which)
-        if few or not all(0 <= each < len(axes.names) for each in self.which):
+        wanted = np.asarray(which)
+        few = wanted.ndim != 1 or len(wanted) not in (1, 2, 3) or len(set(wanted.tolist())) < len(wanted)
+        if few or not all(each in range(len(axes.names)) for each in wanted.tolist()):
             raise DataError(
                 f"coordinates= are two or three different ones of {', '.join(axes.names)}, counted from 0"
             )
+        self.axes, self.which = axes, [int(each) for each in wanted]
         self.names = tuple(axes.names[each] for each in self.which)
         self._is_flat = axes.space.is_flat
         self._identity = np.eye(axes.space.n_actions)[None, self.which]

@@ -19,6 +19,8 @@ NEXT = 3
 """Recordings that are proposed."""
 LONGEST = 0.11
 """Of the longest ellipse, as a share of the scene's extent."""
+THINNEST = 0.07
+"""Of ellipsoids, as a share of the longest: needles are not seen among arrows."""
 ARROW, LIFT = 0.2, 0.02
 
 
@@ -101,8 +103,12 @@ class Diagnosis:
                     head_radius=0.018 * extent,
                     head_length=0.035 * extent,
                 ),
+                # At the tip: several recordings may begin in one place.
                 scene.add_label(
-                    f"/next/{k}/label", f"record next: {k}", position=tuple(at), anchor="bottom-left"
+                    f"/next/{k}/label",
+                    f"record next: {k}",
+                    position=tuple(at + along / 2),
+                    anchor="bottom-left",
                 ),
             ]
 
@@ -132,7 +138,7 @@ def _ellipsoids(stage: Stage, places: Array, lengths: Array, vectors: Array) -> 
         faces,
         batched_wxyzs=Rotation.from_matrix(right_handed).as_quat(scalar_first=True),
         batched_positions=places,
-        batched_scales=np.maximum(lengths, 0.02 * lengths.max()).astype(np.float32),
+        batched_scales=np.maximum(lengths, THINNEST * lengths.max()).astype(np.float32),
         batched_colors=palette.linear(np.array(palette.rgb(palette.UNKNOWN))),
         opacity=0.35,
         lod="off",

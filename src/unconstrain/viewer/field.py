@@ -108,17 +108,17 @@ def stand(stage: Stage, through: str = RECORDED) -> tuple[Array, float]:
     Returns
     -------
     X : ndarray of shape (N, n)
-        States: a grid where all of two are shown, else recorded ones that are spread out.
+        States: a grid where all of one or two are shown, else recorded ones that are spread out.
     longest : float
         How long the longest arrow is, in the scene.
     """
     frame, axes, shown = stage.frame, stage.axes, len(stage.coordinates.names)
-    if frame.is_flat and shown == len(axes.names) == stage.states.shape[1] == 2:
+    if frame.is_flat and shown == len(axes.names) == stage.states.shape[1]:
         low, high = limits(frame)
         spacing = float((high - low).max()) / (ALONG - 1)
         counts = np.maximum(np.round((high - low) / spacing).astype(int) + 1, 2)
         grid = np.meshgrid(*(np.linspace(a, b, k) for a, b, k in zip(low, high, counts, strict=True)))
-        places = np.stack(grid, axis=-1).reshape(-1, 2)
+        places = np.stack(grid, axis=-1).reshape(-1, shown)
         X = np.stack([stage.coordinates.put(stage.start, place) for place in places])
         return X, LONGEST[True] * spacing * frame.scale
     X = farthest_first(stage.states, n_centers=min(IN_SPACE, len(stage.states)))[0]

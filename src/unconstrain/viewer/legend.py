@@ -1,6 +1,7 @@
 """What the page says in words: the legend, what was guessed or left out, and how the rollout ended."""
 
 import re
+from html import escape
 
 from unconstrain.stopping import Movement, describe_stop
 from unconstrain.viewer import palette
@@ -42,7 +43,7 @@ def describe_colours(stage: Stage) -> str:
         (palette.PATH, "rollout from the start that you drag"),
         (palette.HELD, "rollout where something is in its way"),
     ]
-    return TEXT.format("".join(BOX.format(colour=colour, words=words) for colour, words in rows))
+    return TEXT.format("".join(BOX.format(colour=colour, words=escape(words)) for colour, words in rows))
 
 
 def describe_rollout(movement: Movement, stage: Stage) -> str:
@@ -78,12 +79,12 @@ def describe_rollout(movement: Movement, stage: Stage) -> str:
         # What allows it is an argument elsewhere, and a checkbox here.
         told = re.sub(r"; say with beyond=.*", f'; "{ANYWHERE}" lets it go on', told)
         said.append(sentence(told))
-    return TEXT.format(" ".join(said))
+    return TEXT.format(escape(" ".join(said), quote=False))
 
 
 def describe_notes(notes: list[str]) -> str:
     """Write sentences as HTML."""
-    return TEXT.format("<br>".join(sentence(note) for note in notes))
+    return TEXT.format("<br>".join(escape(sentence(note), quote=False) for note in notes))
 
 
 def sentence(text: str) -> str:

@@ -1,5 +1,6 @@
 """A plane to place and tilt, and a box to move, in the way of the rollout."""
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -33,6 +34,8 @@ class Obstacles:
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self._changed = changed
+        # Whoever changes the coordinates draws at once, and the thread that draws does as well.
+        self._lock = threading.Lock()
         self._handles: dict[str, Any] = {}
         self._body: Any = None
         self._stage: Stage | None = None
@@ -42,11 +45,15 @@ class Obstacles:
 
     def draw(self, stage: Stage) -> None:
         """Draw those that are chosen, anew if what is shown changed; see `Part`."""
-        if self._stage is not stage or self._frame is not stage.frame:
-            self.side = BEGINS * stage.frame.extent
+        with self._lock:
+            self._draw(stage, stage.frame)
+
+    def _draw(self, stage: Stage, frame: Frame) -> None:
+        if self._stage is not stage or self._frame is not frame:
+            self.side = BEGINS * frame.extent
             for handle in self._handles.values():
                 handle.remove()
-            self._handles, self._stage, self._frame = {}, stage, stage.frame
+            self._handles, self._body, self._stage, self._frame = {}, None, stage, frame
         wanted = {PLANE: [PLANE], BOX: [BOX], BOTH: [PLANE, BOX]}.get(self.chosen, [])
         for name in (PLANE, BOX):
             if name in wanted and name not in self._handles:
@@ -75,9 +82,10 @@ class Obstacles:
 
     def resize(self, side: float) -> None:
         """Make the box of another side, in the scene."""
-        self.side = side
-        if self._body is not None and self._stage is not None:
-            self._body.dimensions = self._drawn_sides(self._stage)
+        with self._lock:
+            self.side = side
+            if self._body is not None and self._stage is not None:
+                self._body.dimensions = self._drawn_sides(self._stage)
         self._changed()
 
     def place(self, name: str, point: Array, wxyz: Array | None = None) -> None:

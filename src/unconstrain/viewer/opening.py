@@ -89,6 +89,8 @@ def view(
     >>> page.wait()                                                 # doctest: +SKIP
     """
     _check(policy, demos)
+    if robot is None and (site is not None or lock):
+        raise DataError(f"{'lock' if site is None else 'site'}= is of a robot: name its file with robot=")
     port = check_whole(port, "port", least=0, most=65535)
     notes: list[str] = []
     shown = samples.choose(policy, demos)
@@ -100,7 +102,7 @@ def view(
     if robot is not None:
         seen = _hand(robot, site, lock, policy, names, notes)
     else:
-        which = list(range(min(3, len(axes.names)))) if coordinates is None else list(coordinates)
+        which = range(min(3, len(axes.names))) if coordinates is None else coordinates
         seen = Picked(axes, which)
     under = None if constraint is None else _rows(constraint, policy.n_actions_)
     policies = {LEARNT: policy}
@@ -123,7 +125,7 @@ def view(
         axes=axes,
         scenery=(seen, Frame.around(seen.place(X), in_metres=robot is not None)),
         start=X[0].copy(),
-        seconds=_duration(shown.demos),
+        seconds=_duration(shown.demos if demos is None else demos),
         interval=_interval(demos),
         under=under,
     )
@@ -204,11 +206,15 @@ def _rows(constraint: Any, d: int) -> Callable[[Array], Array]:
         A = np.asarray(A, dtype=np.float64)
         return np.broadcast_to(A, (len(X), *A.shape[-2:])) if A.ndim == 2 else A
 
-    trial = np.zeros((1, d)) if callable(constraint) else rows(np.zeros((1, d)))[0]
-    if trial.ndim != 2 or trial.shape[-1] != d:
-        raise DataError(
-            f"constraint= must be rows of {d} numbers, one for each action, got shape {trial.shape}"
-        )
+    if callable(constraint):
+        return rows
+    try:
+        found = rows(np.zeros((1, d)))[0].shape
+    except (TypeError, ValueError):
+        found = None
+    if found is None or len(found) != 2 or found[-1] != d:
+        what = type(constraint).__name__ if found is None else f"shape {found}"
+        raise DataError(f"constraint= must be rows of {d} numbers, one for each action, got {what}")
     return rows
 
 

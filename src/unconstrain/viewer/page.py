@@ -1,12 +1,15 @@
 """The page and its life."""
 
+import atexit
 import threading
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.arrays import check_number
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.errors import UnconstrainError
 from unconstrain.stopping import Movement
 from unconstrain.viewer import camera, exporting, legend, server
 from unconstrain.viewer.controls import Controls
@@ -58,8 +61,8 @@ class Page:
         self._is_under, self._anywhere = stage.under is not None, False
         self.movements, self.field, self.diagnosis = Movements(), Field(demos), Diagnosis(demos)
         self.surroundings, self.path = Surroundings(), Path(stage)
-        self._following = Newest(self._follow, self._fail)
-        self._drawing = Newest(self._draw, self._fail)
+        self._following = Newest(self._follow, self.report)
+        self._drawing = Newest(self._draw, self.report)
         self.obstacles = Obstacles(self.follow)
         self.start = Start(stage, self.drag)
         self.timeline = Timeline(self._at_time)
@@ -68,6 +71,8 @@ class Page:
         camera.look(stage)
         self.redraw()
         self.follow()
+        # Threads that draw when a program ends would complain that the server is gone.
+        atexit.register(self.close)
 
     @property
     def url(self) -> str:
@@ -91,6 +96,7 @@ class Page:
         if self._closed.is_set():
             return
         self._closed.set()
+        atexit.unregister(self.close)
         self.timeline.close()
         self._following.close()
         self._drawing.close()
@@ -221,7 +227,7 @@ class Page:
         seconds : float
             From the start to the end.
         """
-        self.stage.seconds = max(float(seconds), 1e-3)
+        self.stage.seconds = max(check_number(seconds, "seconds", positive=False), 1e-3)
         self.controls.show_seconds(self.stage.seconds)
         self.follow()
 
@@ -336,7 +342,7 @@ class Page:
                 part.draw(stage)
             except Exception as error:
                 if stage.scenery is scenery:  # otherwise it is drawn anew already
-                    self._fail(error)
+                    self.report(error)
         why_not = self.field.sureness(stage).why_not
         if why_not:
             self.say(f"opacity is by distance from recorded states only: {why_not}")
@@ -350,7 +356,10 @@ class Page:
         self.path.mark(state)
         self.controls.time.value = min(seconds, self.controls.time.max)
         for listener in self._state_listeners:
-            listener(state)
+            try:
+                listener(state)
+            except Exception as error:  # it is not ours, and the time line goes on
+                self.report(error)
 
     def say(self, note: str) -> None:
         """Say something on the page, once.
@@ -365,5 +374,13 @@ class Page:
             self.controls.notes.visible = True
             self.controls.notes.content = legend.describe_notes(self.notes)
 
-    def _fail(self, error: Exception) -> None:
-        self.say(str(error))
+    def report(self, error: Exception) -> None:
+        """Say on the page what failed.
+
+        Parameters
+        ----------
+        error : Exception
+            A mistake of the user's, which is a sentence, or of ours.
+        """
+        told = isinstance(error, UnconstrainError)
+        self.say(str(error) if told else f"something failed, {type(error).__name__}: {error}")

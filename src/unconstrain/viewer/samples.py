@@ -16,6 +16,8 @@ MOST = 20_000
 """Samples that are shown; the browser would draw more, but slowly over a network."""
 MOST_JUDGED = 200_000
 """Samples of which contact is inferred."""
+LINE = 20
+"""Samples that an episode has to keep, in the mean, to be seen as a line."""
 ROUNDING = 1e-9
 
 
@@ -72,14 +74,15 @@ def choose(policy: Policy, demos: Demonstrations | None) -> Shown:
     notes = []
     every = -(-len(demos) // MOST)
     if len(demos) > MOST_JUDGED:
-        thin = _thin(demos, every)
-        notes.append(f"of {len(demos):,} samples one in {every} is shown, and judged by itself")
+        kept, words = _kept(demos, every)
+        thin = demos.select(kept)
+        notes.append(f"{words}, and judged by itself")
         free, source = judge(policy, thin)
         return Shown(_continuous(thin), free, source, tuple(notes))
     free, source = judge(policy, demos)
     if every > 1:
-        notes.append(f"of {len(demos):,} samples one in {every} is shown")
-        kept = _kept(demos, every)
+        kept, words = _kept(demos, every)
+        notes.append(words)
         demos, free = demos.select(kept), None if free is None else free[kept]
     return Shown(_continuous(demos), free, source, tuple(notes))
 
@@ -119,12 +122,12 @@ def judge(policy: Policy, demos: Demonstrations) -> tuple[Array | None, str]:
     return free, source
 
 
-def _kept(demos: Demonstrations, every: int) -> NDArray[np.intp]:
-    return np.arange(0, len(demos), every)
-
-
-def _thin(demos: Demonstrations, every: int) -> Demonstrations:
-    return demos.select(_kept(demos, every))
+def _kept(demos: Demonstrations, every: int) -> tuple[NDArray[np.intp], str]:
+    """Choose one in so many of the samples, or of the episodes where they would be points then, and no lines."""
+    if len(demos) < LINE * every * demos.n_episodes and demos.n_episodes >= LINE * every:
+        kept = np.flatnonzero(demos.episodes % every == 0)
+        return kept, f"of {demos.n_episodes:,} episodes one in {every} is shown"
+    return np.arange(0, len(demos), every), f"of {len(demos):,} samples one in {every} is shown"
 
 
 def _continuous(demos: Demonstrations) -> Demonstrations:

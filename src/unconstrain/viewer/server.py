@@ -70,6 +70,10 @@ def check_port(host: str, port: int) -> None:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             trial.bind((host, port))
+        except socket.gaierror as error:
+            raise UnconstrainError(
+                f"{host!r} is no address of this computer ({error.strerror}): give another with host=, or leave it out"
+            ) from None
         except OSError as error:
             reason = error.strerror or str(error)
             raise UnconstrainError(

@@ -44,7 +44,8 @@ class Surroundings:
         away = 0.05 * frame.extent
         for axis, values in enumerate(ticks):
             aside = np.zeros(3)
-            aside[0 if axis == 1 or axis == 2 else 1] = -away
+            # Numbers of the third axis stand farther out, lest they cover those of the others at their corner.
+            aside[[[1], [0], [0, 1]][axis]] = -away
             for k, value in enumerate(values):
                 at = corner + aside
                 at[axis] = frame.to_scene(np.full((1, len(low)), value))[0, axis]

@@ -118,6 +118,16 @@ def test_metres_beside_degrees_are_not_taken_for_motion_that_never_is():
     assert find_fixed(demos, scale) == ("0.894 u2 - 0.447 u3 ≈ 0",)
 
 
+def test_of_many_equations_the_verdict_says_how_many():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(200, 12)) @ rng.normal(size=(12, 12))
+    U = -X @ np.linalg.svd(rng.normal(size=(12, 6)), full_matrices=False)[0] @ rng.normal(size=(6, 12))
+    demos = uc.Demonstrations(X, U, np.arange(200) // 20, np.arange(200) * 0.01)
+    said = str(uc.evaluate(uc.ParametricPolicy().fit(demos), demos).verdict)
+    assert "nothing moves along 6 of 12 directions" in said
+    assert "≈" not in said
+
+
 def reaches(rng):
     """Ways that slow down, each to a goal of its own."""
     share = 1 - np.exp(-np.linspace(0, 5, 60))[:, None]

@@ -17,6 +17,9 @@ FEWEST = 20
 DETERMINED = 0.9
 """Share of the policy that recordings have to determine, or else the rest is named."""
 
+LONGEST_EQUATIONS = 120
+"""Characters of equations that a sentence can hold; of more, their number is said."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -69,9 +72,7 @@ def conclude(found: Findings) -> Verdict:
         head = "safe to try on a robot, slowly: "
         clauses = [constraints, explained, _describe_following(found)]
     if found.fixed:
-        clauses.append(
-            f"all motion obeys {' and '.join(found.fixed)}, so nothing is known of the policy across that"
-        )
+        clauses.append(_describe_fixed(found))
     sentence = head + "; ".join(clause for clause in clauses if clause)
     return Verdict(not (against or not_followed), max(found.explained, found.typical) >= BARELY, sentence)
 
@@ -141,6 +142,16 @@ def _describe_constraints(found: Findings) -> str:
     if found.is_regression or found.free > 1 - LITTLE / 2:
         return "no varying constraint was found"
     return f"a varying constraint seems to have bent {1 - found.free:.0%} of the samples"
+
+
+def _describe_fixed(found: Findings) -> str:
+    equations = " and ".join(found.fixed)
+    if len(equations) <= LONGEST_EQUATIONS:
+        return f"all motion obeys {equations}, so nothing is known of the policy across that"
+    return (
+        f"nothing moves along {len(found.fixed)} of {found.n_actions} directions (`unconstrain constraints` names "
+        "them), so nothing is known of the policy there"
+    )
 
 
 def _describe_explained(found: Findings) -> str:

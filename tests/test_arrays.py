@@ -147,3 +147,17 @@ def test_values_of_another_kind_are_told_in_one_sentence(call, sentence):
         call()
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
+
+
+def test_what_is_masked_is_missing_and_no_number():
+    X = np.random.default_rng(0).normal(size=(9, 2))
+    masked = np.ma.masked_greater(X, 0.5)
+    row = int(np.argmax(masked.mask.any(axis=1)))
+    for learn in (
+        lambda: uc.ParametricPolicy().fit(masked, X),
+        lambda: uc.ParametricPolicy().fit(X, masked),
+        lambda: uc.ParametricPolicy().fit(X, X).predict(masked),
+        lambda: uc.Demonstrations(masked, X),
+    ):
+        with pytest.raises(uc.errors.DataError, match=rf"row {row}\b"):
+            learn()

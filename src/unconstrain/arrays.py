@@ -57,7 +57,7 @@ def check_numbers(array: ArrayLike, name: str) -> np.ndarray:
         For text, complex numbers, and rows of different lengths.
     """
     try:
-        given = np.asarray(array)
+        given = np.asarray(unmask(array))
         numbers = given.real.astype(np.float64, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
         raise DataError(
@@ -66,6 +66,22 @@ def check_numbers(array: ArrayLike, name: str) -> np.ndarray:
     if np.iscomplexobj(given):
         raise DataError(f"{name} must be real numbers, and these are complex: give their parts as columns")
     return numbers
+
+
+def unmask(array: ArrayLike | None) -> ArrayLike | None:
+    """Return an array whose masked entries are NaN: what is behind a mask is missing, and no number.
+
+    Parameters
+    ----------
+    array : array_like or None
+        Whatever was given.
+
+    Returns
+    -------
+    array_like or None
+        The same, but for masked arrays.
+    """
+    return np.ma.filled(array.astype(np.float64), np.nan) if isinstance(array, np.ma.MaskedArray) else array
 
 
 def check_finite(array: np.ndarray, name: str) -> None:
@@ -145,7 +161,7 @@ def check_states(estimator: "BaseEstimator", X: ArrayLike, *, reset: bool = Fals
 
     expected = None if reset else getattr(estimator, "n_features_in_", None)
     with _one_sentence(lambda: _hint_at_states(X, expected)):
-        states = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
+        states = validate_data(estimator, unmask(X), reset=reset, dtype=np.float64, ensure_all_finite=False)
     check_finite(states, "X")
     _check_not_too_large("the states X", states)
     return states
@@ -186,8 +202,8 @@ def check_samples(
     if y is None:
         raise DataError(f"{type(estimator).__name__} requires y to be passed, but the target y is None")
     with _one_sentence(lambda: _hint_at_samples(X, y)):
-        states = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
-        actions = check_array(y, dtype=np.float64, ensure_2d=False, ensure_all_finite=False, input_name="y")
+        states = validate_data(estimator, unmask(X), reset=reset, dtype=np.float64, ensure_all_finite=False)
+        actions = check_array(unmask(y), dtype=np.float64, ensure_2d=False, ensure_all_finite=False, input_name="y")
         check_consistent_length(states, actions)
     check_finite(states, "X")
     check_finite(actions, "y (the actions)")

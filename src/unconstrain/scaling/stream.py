@@ -96,8 +96,8 @@ def fit_stream(
         How many samples are added up at a time: at most as many, or, where blocks hold whole episodes, at least.
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed: a random sample of the files'
-        rows (all of them, if there are no more), the first rows of an iterable; of these, those that move, unless
-        the risk is "direct" or "corrected".
+        rows (all of them, if there are no more; of 16 or more row groups at most the first 131,072 of each), the first
+        rows of an iterable; of these, those that move, unless the risk is "direct" or "corrected".
     random_state : int
         Of that sample.
 

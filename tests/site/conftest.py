@@ -37,8 +37,8 @@ def address(site):
     server.server_close()
 
 
-@pytest.fixture(scope="session")
-def chromium():
+@pytest.fixture(scope="module")  # and no longer: no other test may start a browser, or a loop, before it ends
+def chromium(site):
     if CHROMIUM is None:
         pytest.skip("there is no browser: Debian's package chromium")
     playwright = pytest.importorskip("playwright.sync_api")

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from unconstrain import atomic
-from unconstrain.arrays import quote
-from unconstrain.errors import UnconstrainError
+from unconstrain.errors import UnconstrainError, show
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +57,7 @@ def save(figure: "Figure", path: str | os.PathLike[str]) -> Path:
     """
     if not hasattr(figure, "savefig"):
         raise UnconstrainError(
-            f"a figure is what ax.figure is, of the axes that were drawn on, not {quote(figure)}"
+            f"a figure is what ax.figure is, of the axes that were drawn on, not {show(figure)}"
         )
     check_suffix(path)
     path = Path(path)

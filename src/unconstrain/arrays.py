@@ -203,7 +203,9 @@ def check_samples(
         raise DataError(f"{type(estimator).__name__} requires y to be passed, but the target y is None")
     with _one_sentence(lambda: _hint_at_samples(X, y)):
         states = validate_data(estimator, unmask(X), reset=reset, dtype=np.float64, ensure_all_finite=False)
-        actions = check_array(unmask(y), dtype=np.float64, ensure_2d=False, ensure_all_finite=False, input_name="y")
+        actions = check_array(
+            unmask(y), dtype=np.float64, ensure_2d=False, ensure_all_finite=False, input_name="y"
+        )
         check_consistent_length(states, actions)
     check_finite(states, "X")
     check_finite(actions, "y (the actions)")

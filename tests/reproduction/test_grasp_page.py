@@ -114,7 +114,9 @@ def test_the_page_in_a_browser(grasp, browser):
     page.mouse.move((x + to_x) / 2, (y + to_y) / 2)
     page.mouse.move(to_x, to_y, steps=2)
     page.mouse.up()
-    assert wait_for(lambda: abs(grasp.interaction.in_the_way.aside) < 0.03), "the handle is dragged to the right"
+    assert wait_for(lambda: abs(grasp.interaction.in_the_way.aside) < 0.03), (
+        "the handle is dragged to the right"
+    )
 
     page.evaluate(
         "document.querySelectorAll('.mantine-Notification-closeButton').forEach(each => each.click())"

@@ -16,7 +16,7 @@ def demos():
 
 @pytest.fixture(scope="session")
 def policy(demos):
-    return uc.LocallyLinearPolicy(n_centers=12, alpha=1e-3).fit(demos)
+    return uc.ParametricPolicy(uc.NormalizedRBF(n_centers=36), alpha=1e-3).fit(demos)
 
 
 @pytest.fixture

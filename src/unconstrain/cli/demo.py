@@ -66,8 +66,8 @@ def demo(out: Path, overwrite: bool) -> None:
     reporting.say(f"another recording, a hand that wipes boards, with a force sensor: {wiping}")
     reporting.say("\nnext, the same from a file (put your own in its place):")
     reporting.say(
-        f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --time t --episode episode --model rbf "
-        f"--width {experiment.WIDTH} --out {reporting.shell_word(out / 'policy.skops')} --overwrite"
+        f"  unconstrain fit {reporting.shell_word(data)} --state x1,x2 --action u1,u2 --time t --episode episode "
+        f"--model rbf --width {experiment.WIDTH} --out {reporting.shell_word(out / 'policy.skops')} --overwrite"
     )
 
 

@@ -58,6 +58,17 @@ def test_boxes_are_those_of_numpy(n, coarseness, monkeypatch):
     np.testing.assert_array_equal(found.boxes, plain.boxes)
 
 
+def test_states_on_edges_lie_in_the_boxes_of_numpy(monkeypatch):
+    unit = np.array([0.3, 0.7])
+    Z = (
+        np.random.default_rng(0).integers(-40, 40, size=(5000, 2)) * (0.25 * unit) / 3 * 3
+    )  # or a rounding aside
+    found = Region.of(Z, unit, 2)
+    assert found.distance(Z).max() == 0
+    monkeypatch.setattr(loops, "WORTH", np.inf)
+    np.testing.assert_array_equal(found.boxes, Region.of(Z, unit, 2).boxes)
+
+
 def test_the_chain_is_that_of_numpy(monkeypatch):
     rng = np.random.default_rng(0)
     logs, starts = rng.normal(size=(2, 3000)) * 30, rng.random(3000) < 0.01

@@ -9,7 +9,9 @@ REORDER = {"reassoc", "contract", "arcp", "nsz"}
 """Sums may be taken in any order, or they could not be taken several at a time. NaN and infinity stay what they are."""
 
 
-def compiled(*signature: Any, nogil: bool = True) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def compiled(
+    *signature: Any, nogil: bool = True, exact: bool = False
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Compile a function, and keep the result on disk where there is a place for it.
 
     Parameters
@@ -19,6 +21,8 @@ def compiled(*signature: Any, nogil: bool = True) -> Callable[[Callable[..., Any
         when it is first called.
     nogil : bool
         Whether other threads run meanwhile.
+    exact : bool
+        Whether every operation is rounded as NumPy rounds it, and none put in another order.
 
     Returns
     -------
@@ -26,7 +30,7 @@ def compiled(*signature: Any, nogil: bool = True) -> Callable[[Callable[..., Any
         A decorator.
     """
     make: Any = njit
-    options: dict[str, Any] = {"nogil": nogil, "fastmath": REORDER, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": nogil, "fastmath": not exact and REORDER, "error_model": "numpy"}
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         try:

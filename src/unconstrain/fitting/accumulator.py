@@ -489,9 +489,10 @@ class Accumulator:
         known = [0 if region is None else region.coarseness for region in self.total.regions]
 
         def find(rows: np.ndarray, k: int) -> Region:
-            while len(reached) <= k:
-                reached.append(known[k] if k < len(known) else 0)
-            region = Region.of(Z if rows.all() else Z[rows], unit, reached[k])
+            while len(reached) <= k:  # zeros, since another thread may do the same meanwhile
+                reached.append(0)
+            begun = max(reached[k], known[k] if k < len(known) else 0)
+            region = Region.of(Z if rows.all() else Z[rows], unit, begun)
             reached[k] = max(reached[k], region.coarseness)
             return region
 

@@ -8,7 +8,7 @@ import math
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,9 @@ from unconstrain.fitting.observation import Observation, informative, observe, u
 from unconstrain.fitting.region import Region
 from unconstrain.fitting.solve import EpisodeFolds, choose_alpha
 from unconstrain.fitting.sums import Sums
+from unconstrain.fitting.wide.choice import choose_alpha as choose_alpha_of_held
+from unconstrain.fitting.wide.decay import WideDecay
+from unconstrain.fitting.wide.held import HeldSamples
 from unconstrain.motion import NO_MOTION, lengths
 from unconstrain.samples import Samples
 
@@ -153,6 +156,8 @@ class Accumulator:
         For "adaptive": whether the sums that λ is chosen by are kept too.
     finds_region : bool
         Whether it is kept where samples lie.
+    holds : bool
+        Whether samples are held instead of summed up, since the model is wide (`fitting.wide`).
     compared : tuple of tuple of Belief
         For "adaptive": beliefs whose likelihood is summed up, instead of moments; each one for all samples, or one for
         each fold.
@@ -184,6 +189,7 @@ class Accumulator:
         self.finds_region = unit is not None
         self.is_judged = alpha == "cv"
         self.compared: tuple[tuple[Belief, ...], ...] = ()
+        self.holds = False
         self.total = Sums()
         # By fold, how coarse the boxes of earlier samples became: those of later ones need not begin finer.
         self._coarseness: list[int] = []
@@ -339,7 +345,7 @@ class Accumulator:
             self.unit,
         )
         other.is_judged, other.compared = self.is_judged, self.compared
-        other.finds_region = self.finds_region
+        other.finds_region, other.holds = self.finds_region, self.holds
         return other
 
     def copy(self) -> "Accumulator":
@@ -388,6 +394,27 @@ class Accumulator:
         DataError
             There is nothing to learn from.
         """
+        total = self.observed(without)
+        return total.summed() if isinstance(total, HeldSamples) else total
+
+    def observed(self, without: int | None = None) -> Moments | HeldSamples:
+        """Add up all folds, or all but one, as they are kept.
+
+        Parameters
+        ----------
+        without : int, optional
+            The fold left out.
+
+        Returns
+        -------
+        Moments or HeldSamples
+            Their sum.
+
+        Raises
+        ------
+        DataError
+            There is nothing to learn from.
+        """
         return self._observed(add_up(self._folds(without)))
 
     def by_fold(self) -> list[Moments | None]:
@@ -400,6 +427,7 @@ class Accumulator:
         """
         parts = self.total.moments
         if self.risk != "corrected":
+            parts = tuple(part.summed() if isinstance(part, HeldSamples) else part for part in parts)
             return [part if isinstance(part, Moments) else None for part in parts]
         correction = Correction.of(add_up(self._folds(None)), self.noise)
         return [
@@ -407,7 +435,13 @@ class Accumulator:
             for part in parts
         ]
 
-    def solve(self, alpha: float | str | None = None, without: int | None = None) -> Solution:
+    def solve(
+        self,
+        alpha: float | str | None = None,
+        without: int | None = None,
+        *,
+        near: float | None = None,
+    ) -> Solution:
         """Solve for the parameters.
 
         Parameters
@@ -416,6 +450,8 @@ class Accumulator:
             The weight decay λ, or "cv" where the sums were kept by fold. By default as at the beginning.
         without : int, optional
             A fold to leave out; λ is then chosen among the others. It costs no pass over the data.
+        near : float, optional
+            About where λ is. Of held samples, for which each candidate costs passes, only those near it are tried.
 
         Returns
         -------
@@ -431,13 +467,32 @@ class Accumulator:
         folds = self._folds(without)
         if self.risk == "corrected":
             return self._solve_corrected(folds, alpha)
+        judges: list[Any] = [
+            part for k, part in enumerate(self.total.judges) if part is not None and k != without
+        ]
+        if self.holds:
+            return self._solve_held(folds, judges or None, alpha, near)
         total = add_up(folds)
         decay = self.model.decay(total)
         if alpha != "cv":
             return self._solution(decay.solve(total, float(alpha)), float(alpha))
-        judges = [part for k, part in enumerate(self.total.judges) if part is not None and k != without]
         chosen, alphas, risk = choose_alpha(folds, self.model.decay, judges or None)
         return self._solution(decay.solve(total, chosen), chosen, alphas, risk)
+
+    def _solve_held(
+        self,
+        folds: list[HeldSamples],
+        judges: list[HeldSamples] | None,
+        alpha: float | str,
+        near: float | None,
+    ) -> Solution:
+        """Solve by conjugate gradients, from the parameters that are believed so far."""
+        decay = WideDecay(folds, judges)
+        start = None if self.belief is None else self.belief.w
+        if alpha != "cv":
+            return self._solution(decay.solve(float(alpha), start), float(alpha))
+        chosen, alphas, risk = choose_alpha_of_held(decay, near)
+        return self._solution(decay.solve(chosen, start), chosen, alphas, risk)
 
     def _solve_corrected(self, folds: list[Any], alpha: float | str) -> Solution:
         """Find the noise of all folds together, and solve what is observed beyond it."""
@@ -536,14 +591,15 @@ class Accumulator:
             tallies.append(infer(self.model, beliefs[k], part).tally)
         return reduce(operator.add, tallies)
 
-    def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Moments:
+    def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Part:
         X, weights = samples.states, samples.weights
+        add: Callable[..., Any] = partial(HeldSamples.of, self.model) if self.holds else self.model.moments
         if rows.all():
-            return self.model.moments(X, observation, weights)
+            return add(X, observation, weights)
         index = np.flatnonzero(rows)
         # Stored a row a dimension, along which sums run.
         taken = None if weights is None else weights[index]
-        return self.model.moments(X.T.take(index, axis=1).T, observation[index], taken)
+        return add(X.T.take(index, axis=1).T, observation[index], taken)
 
 
 def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> np.ndarray:

@@ -32,6 +32,8 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.plausible import check_scale
 from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.fitting.wide.decay import WideDecay
+from unconstrain.fitting.wide.held import HeldSamples
 
 COOLING = 0.8
 """By what the noise's deviation is lowered from one pass to the next, at most."""
@@ -172,7 +174,7 @@ class Run:
     def _step(self, done: Accumulator, floor: float) -> None:
         belief, (tally,) = self.belief, done.total.tallies
         if done.is_judged or self.alpha is None:
-            chosen = done.solve().alpha
+            chosen = done.solve(near=self.alpha).alpha
             if self.alpha is not None:
                 chosen = float(np.clip(chosen, self.alpha / LARGEST_STEP, self.alpha * LARGEST_STEP))
             self.alpha = chosen
@@ -322,7 +324,7 @@ class Inference:
 
     def _start(self, done: Accumulator, name: str) -> None:
         solution = done.solve()
-        total, d = done.moments(), self.blank.model.n_actions
+        total, d = done.observed(), self.blank.model.n_actions
         if name == FREE:
             whole = total if total.everywhere is None else total.everywhere
             self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
@@ -505,14 +507,16 @@ def _between(a: Belief, b: Belief) -> Belief:
     )
 
 
-def _errors(moments: Moments, w: np.ndarray) -> float:
+def _errors(moments: Moments | HeldSamples, w: np.ndarray) -> float:
     return float(np.sum(moments.risk(w[..., :, None, :])))
 
 
-def _solved(done: Accumulator, w: np.ndarray) -> tuple[Moments, np.ndarray]:
+def _solved(done: Accumulator, w: np.ndarray) -> tuple[Moments | HeldSamples, np.ndarray]:
     """Return the moments without those of all samples, and parameters in the form in which moments take them."""
-    total = replace(done.moments(), everywhere=None)
-    return total, done.model.solution(w, total.g.shape[-1])
+    total = done.observed()
+    if isinstance(total, Moments):
+        total = replace(total, everywhere=None)
+    return total, done.model.solution(w, total.n_targets)
 
 
 def _residual(done: Accumulator, w: np.ndarray) -> float:
@@ -531,11 +535,11 @@ def _shrinkage(done: Accumulator, before: np.ndarray, after: np.ndarray) -> floa
 
 def _share_left(done: Accumulator, alpha: float, count: float) -> float:
     """Share of the residuals' freedom that is left once the parameters are fitted."""
-    total = done.moments()
-    if total.H.ndim > 2:  # neighbouring local models share their samples
+    total = done.observed()
+    if isinstance(total, HeldSamples):
+        used = WideDecay([total]).used(alpha)
+    elif total.H.ndim > 2:  # neighbouring local models share their samples
         return 1.0
-    decay = done.model.decay(total)
-    standard = decay.standardize(total)
-    values = np.maximum(np.linalg.eigvalsh(standard.H), 0.0)
-    used = float(np.sum(values / (values + alpha * decay.scale + np.finfo(np.float64).tiny)))
+    else:
+        used = done.model.decay(total).used(total, alpha)
     return max(1.0 - used / max(count, 1.0), 0.2)

@@ -25,6 +25,7 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.fitting.region import find_unit
+from unconstrain.fitting.wide.held import is_wide
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import check_input
 from unconstrain.policies.missing import MissingSumsError
@@ -81,6 +82,8 @@ class LinearPolicy(Policy):
     def learn(self, samples: Samples, space: Space | None, noise: float | None) -> None:
         """Add the samples up, as often as the risk needs, and solve the sums; see `Policy.learn`."""
         accumulator = self.start(samples, space, noise)
+        if self.risk != "corrected":  # which takes noise away from moments
+            accumulator.holds = is_wide(accumulator.model, samples.states[:1], whole=self.risk == "direct")
         if self.risk == "adaptive":
             accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
         else:

@@ -82,7 +82,7 @@ def path() -> Ratio:
 
 def memory() -> Ratio:
     """Peak memory of that fit, in a process of its own."""
-    command = [sys.executable, "-m", "benchmarks.wide", str(N_SAMPLES), str(N_CENTERS)]
+    command = [sys.executable, "-m", "benchmarks.wide", str(N_SAMPLES), str(N_CENTERS), str(ALPHA)]
     out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     ours = float(out.splitlines()[-1])
     return Ratio("iterative-memory", "peak of iterative-fit", "1 GiB", ours / 2**30, 1.0, ours, float(2**30))
@@ -90,14 +90,14 @@ def memory() -> Ratio:
 
 def wider() -> None:
     """Print how long 100,100 parameters take on 200,000 samples, and how much memory."""
-    command = [sys.executable, "-m", "benchmarks.wide", "200000", "14300"]
+    command = [sys.executable, "-m", "benchmarks.wide", "200000", "14300", "0.1"]
     print(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
 def main() -> None:
-    n_samples, n_centers = (int(each) for each in sys.argv[1:])
+    n_samples, n_centers, alpha = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     X, U, groups = half_free(n_samples, N_STATES)
-    policy = _policy(X, n_centers)
+    policy = _policy(X, n_centers, alpha)
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("default")

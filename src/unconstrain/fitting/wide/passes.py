@@ -24,7 +24,7 @@ NUMBERS_IN_BLOCK = 2**18
 REMEMBERED = 2**29
 """Bytes that the basis of all samples may take to be remembered."""
 
-FEWEST_ROWS = 64
+FEWEST_ROWS = 128
 
 
 @dataclass(frozen=True)

@@ -113,14 +113,7 @@ class Policy(RegressorMixin, BaseEstimator):
         PolicyError
             An option is impossible.
         """
-        fresh = self._without_stability()
-        samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-        space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
-        fresh.actions_are_scalars_ = scalars
-        order = self._order(samples)
-        samples = samples if order is None else samples.select(order)
-        fresh.learn(samples, space, noise)
-        return self._become(fresh)
+        return self._fit(X, y, groups, sample_weight, projections, type(self).learn)
 
     @abstractmethod
     def learn(self, samples: Samples, space: Space | None, noise: float | None) -> None:
@@ -729,6 +722,19 @@ class Policy(RegressorMixin, BaseEstimator):
 
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
+
+    def _fit(
+        self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, learn: Callable[..., None]
+    ) -> Self:
+        """Check what `fit` was given, and let a copy learn as `learn` does, which this policy then becomes."""
+        fresh = self._without_stability()
+        samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
+        space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
+        fresh.actions_are_scalars_ = scalars
+        order = self._order(samples)
+        samples = samples if order is None else samples.select(order)
+        learn(fresh, samples, space, noise)
+        return self._become(fresh)
 
     def _order(self, samples: Samples) -> NDArray[np.intp] | None:
         return None if self.keeps_order else samples.order()

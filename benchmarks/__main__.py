@@ -24,7 +24,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, models, start, step, stream, viewer, warm
+from benchmarks import fits, identifiability, latency, models, start, step, stream, viewer, warm
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -47,6 +47,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-local-memory": stream.local_memory,
     **warm.BENCHMARKS,
     **step.BENCHMARKS,
+    **latency.BENCHMARKS,
     **start.BENCHMARKS,
     **viewer.BENCHMARKS,
 }

@@ -24,7 +24,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, latency, models, start, step, stream, viewer, warm
+from benchmarks import fits, identifiability, latency, models, predict, start, step, stream, viewer, warm
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -48,6 +48,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     **warm.BENCHMARKS,
     **step.BENCHMARKS,
     **latency.BENCHMARKS,
+    **predict.BENCHMARKS,
     **start.BENCHMARKS,
     **viewer.BENCHMARKS,
 }

@@ -98,6 +98,7 @@ __all__ = [
     "select_policy",
     "spaces",
     "torch",
+    "verbose",
     "view",
     "viewer",
 ]
@@ -137,6 +138,7 @@ _HOMES = {
     "unconstrain.selection": ("select_policy",),
     "unconstrain.version": ("__version__",),
     "unconstrain.viewer": ("view",),
+    "unconstrain.waiting": ("verbose",),
 }
 
 _NAMESPACES = {

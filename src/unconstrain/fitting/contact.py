@@ -31,6 +31,7 @@ from unconstrain.fitting.model import Model
 from unconstrain.fitting.noise import Noise, Squares
 from unconstrain.fitting.observation import Expanded, unknown
 from unconstrain.samples import Samples
+from unconstrain.waiting import each
 
 Floats = NDArray[np.float64]
 
@@ -291,7 +292,8 @@ def infer_free(model: Model, belief: Belief, samples: Samples) -> Floats:
     begins = np.append(np.flatnonzero(episode_starts(samples)), N)
     cuts = np.unique(begins[np.searchsorted(begins, np.arange(0, N + SOME, SOME)).clip(max=len(begins) - 1)])
     free = np.empty(N)
-    for start, stop in itertools.pairwise(cuts.tolist()):
+    pieces = list(itertools.pairwise(cuts.tolist()))
+    for start, stop in each(pieces, "telling which samples were free", unit="pieces"):
         free[start:stop] = infer(model, belief, samples.select(slice(start, stop))).free
     return free
 

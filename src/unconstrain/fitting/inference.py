@@ -19,6 +19,7 @@ Given the policy of most of the samples, a single run goes on from that, and has
 is held out as well as before; else all is inferred anew (`fitting.at_hand`).
 """
 
+import itertools
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -36,6 +37,7 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.plausible import check_scale
 from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.waiting import stage
 
 COOLING = 0.8
 """By what the noise's deviation is lowered from one pass to the next, at most."""
@@ -78,6 +80,9 @@ WARMTH = 10.0**2
 """By what the variance found is multiplied for the run that starts where the likelier of two ended. In many dimensions
 a free sample shows directions that no other does, is far from a policy that has not learnt them, and so is taken for
 constrained for ever; with more noise a policy that is nearly right takes it for free."""
+
+USUAL_RUN = 15
+"""Passes that a run from nothing takes in the usual case, for those who wait."""
 
 SHORT_RUN, SHORTEST_RUN = 8, 2
 """Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
@@ -331,6 +336,20 @@ class Inference:
         return "last pass" if self.stage == "final" else "held-out likelihood"
 
     @property
+    def n_expected(self) -> int:
+        """How many passes are probably still to be made, for those who wait."""
+        if self.result is not None:
+            return 0
+        alone = {FREE: SHORTEST_RUN} | ({} if self.at_hand is None else {FREE: 1, AT_HAND: SHORT_RUN})
+        if self.at_hand is None:
+            alone |= {FROM_DIRECT: USUAL_RUN, FROM_INCONSISTENCY: USUAL_RUN, CONSTRAINED: SHORT_RUN}
+        made = {run.name: run.passes for run in self.runs}
+        runs = 0 if self.stage == "final" else sum(max(n - made.get(name, 0), 0) for name, n in alone.items())
+        running = bool(self.runs) and self.stage == "run" and not self.runs[-1].is_done
+        comparing = 0 if self.stage == "final" else 2
+        return max(runs, int(running)) + comparing + 1
+
+    @property
     def _floor(self) -> float:
         beside_speed = self.stage == "run" and "speed" in self.runs[-1].kinds
         share = LEAST_NOISE_BESIDE_SPEED if beside_speed else LEAST_NOISE
@@ -554,11 +573,30 @@ def infer_contact(
         With the sums of the last pass.
     """
     inference = Inference(blank, at_hand)
-    while (wanted := inference.next_pass()) is not None:
-        add(wanted)
-        inference.take(wanted)
+    pass_through(inference, add)
     assert inference.result is not None
     return inference.result
+
+
+def pass_through(inference: Inference, add: Callable[[Accumulator], None]) -> None:
+    """Make all passes of an inference.
+
+    Parameters
+    ----------
+    inference : Inference
+        That has not begun.
+    add : callable
+        Adds all samples to an accumulator.
+    """
+    with stage("inferring contact", unit="passes") as report:
+        for number in itertools.count(1):
+            wanted = inference.next_pass()
+            if wanted is None:
+                break
+            report.begin(f"inferring contact: {inference.description}")
+            add(wanted)
+            inference.take(wanted)
+            report(number, number + inference.n_expected)
 
 
 def _held_out_beliefs(run: Run, noise: Noise) -> tuple[Belief, ...]:

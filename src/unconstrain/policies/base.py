@@ -33,6 +33,7 @@ from unconstrain.fitting.region import Region, find_apart, unite
 from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
 from unconstrain.spaces import Numbers, Space
+from unconstrain.waiting import stage
 
 if TYPE_CHECKING:
     from unconstrain.deploy.compiled import CompiledPolicy
@@ -256,6 +257,7 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return self.solution_.usual_speed
 
+    @stage("making it stable")
     def stabilized(
         self,
         goal: ArrayLike,
@@ -375,6 +377,7 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return max(1.0, find_apart(self.solution_.regions))
 
+    @stage("telling which samples were free")
     def free_probability(
         self,
         X: ArrayLike | Demonstrations,
@@ -723,6 +726,7 @@ class Policy(RegressorMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
 
+    @stage("fitting")
     def _fit(
         self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, learn: Callable[..., None]
     ) -> Self:

@@ -32,6 +32,7 @@ from unconstrain.policies.missing import MissingSumsError
 from unconstrain.policies.setting import settle
 from unconstrain.samples import Samples
 from unconstrain.spaces import Space
+from unconstrain.waiting import stage
 
 
 class LinearPolicy(Policy):
@@ -147,6 +148,7 @@ class LinearPolicy(Policy):
             accumulator.add(samples)
         _settle(self, accumulator)
 
+    @stage("fitting")
     def partial_fit(
         self,
         X: ArrayLike | Demonstrations,

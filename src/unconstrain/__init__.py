@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from unconstrain.scaling.stream import fit_stream
     from unconstrain.selection import select_policy
     from unconstrain.viewer import view
+    from unconstrain.waiting import verbose
 
     __version__: str
 

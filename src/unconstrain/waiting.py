@@ -50,14 +50,17 @@ class _Row:
 
     def __init__(self, bars: Any, text: str, total: int | None, unit: str) -> None:
         self._bars, self._unit = bars, unit
-        self.task = bars.add_task(text, total=total, told="")
+        self.task = bars.add_task(text, total=total, told="" if total is None else self._tell(0, total))
 
     def __call__(self, done: int, total: int | None = None) -> None:
-        of = f" of {total:,}" if total else ""
-        self._bars.update(self.task, completed=done, total=total, told=f"{done:,}{of} {self._unit}".rstrip())
+        self._bars.update(self.task, completed=done, total=total, told=self._tell(done, total))
 
     def begin(self, text: str) -> None:
         self._bars.update(self.task, description=text, refresh=True)
+
+    def _tell(self, done: int, total: int | None) -> str:
+        of = f" of {total:,}" if total else ""
+        return f"{done:,}{of} {self._unit}".rstrip()
 
 
 class _Terminal:
@@ -69,8 +72,9 @@ class _Terminal:
 
         class Late(Progress):
             def get_renderables(self) -> Iterable[Any]:
-                shown = [task for task in self.tasks if (task.elapsed or 0.0) >= DELAY]
-                return [self.make_tasks_table(shown)]
+                # Within the first, what only has a name says nothing more.
+                counted = [task for task in self.tasks if task.fields["told"] or task is self.tasks[0]]
+                return [self.make_tasks_table([task for task in counted if (task.elapsed or 0.0) >= DELAY])]
 
         text, told = (
             TextColumn(form, markup=False) for form in ("{task.description}", "{task.fields[told]}")

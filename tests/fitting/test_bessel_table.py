@@ -15,11 +15,3 @@ def test_what_is_interpolated_is_what_bessel_functions_say(d):
         log_mean, gammaln(d / 2) + nu * np.log(2 / kappa) + np.log(bessel), atol=1e-13, rtol=0
     )
     np.testing.assert_allclose(short, 1 - ive(nu + 1, kappa) / bessel, rtol=2e-13)
-
-
-def test_what_is_no_number_stays_none_and_none_beside_it_changes():
-    log_mean, short = scaled_bessel(3, np.array([1.0, np.nan, 30.0, 1e5]))
-    alone = scaled_bessel(3, np.array([1.0, 30.0, 1e5]))
-    np.testing.assert_array_equal(log_mean[[0, 2, 3]], alone[0])
-    assert np.isnan(log_mean[1])
-    np.testing.assert_array_equal(short[[0, 2, 3]], alone[1])

@@ -224,8 +224,8 @@ def _bessel(d: int, kappa: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     from scipy.special import gammaln, ive
 
     nu = d / 2 - 1
-    bessel = ive(nu, kappa)
-    log_mean = gammaln(d / 2) + nu * np.log(2 / kappa) + np.log(bessel)
+    bessel: Floats = np.asarray(ive(nu, kappa), dtype=np.float64)
+    log_mean = float(gammaln(d / 2)) + nu * np.log(2 / kappa) + np.log(bessel)
     return log_mean, 1 - ive(nu + 1, kappa) / bessel, bessel > 1e-290
 
 

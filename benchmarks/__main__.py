@@ -25,7 +25,19 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, models, start, step, stream, viewer, wide
+from benchmarks import (
+    fits,
+    identifiability,
+    latency,
+    models,
+    predict,
+    start,
+    step,
+    stream,
+    viewer,
+    warm,
+    wide,
+)
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -49,7 +61,10 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-local": stream.local,
     "stream-linear-memory": stream.linear_memory,
     "stream-local-memory": stream.local_memory,
+    **warm.BENCHMARKS,
     **step.BENCHMARKS,
+    **latency.BENCHMARKS,
+    **predict.BENCHMARKS,
     **start.BENCHMARKS,
     **viewer.BENCHMARKS,
 }

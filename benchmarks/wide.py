@@ -13,7 +13,7 @@ import warnings
 import numpy as np
 
 import unconstrain as uc
-from benchmarks.fits import half_free
+from benchmarks.fits import draw_half_free
 from benchmarks.ratio import Ratio
 from unconstrain.fitting.observation import observe
 from unconstrain.fitting.wide.decay import WideDecay
@@ -48,7 +48,7 @@ def _one_pass(policy: uc.ParametricPolicy, X: np.ndarray, U: np.ndarray) -> floa
 
 def fit() -> Ratio:
     """10,500 parameters on 20,000 samples, beside as many passes as the solution takes."""
-    X, U, groups = half_free(N_SAMPLES, N_STATES)
+    X, U, groups = draw_half_free(N_SAMPLES, N_STATES)
     policy = _policy(X)
     start = time.perf_counter()
     policy.fit(X, U, groups=groups)
@@ -70,7 +70,7 @@ def fit() -> Ratio:
 
 def path() -> Ratio:
     """λ by cross-validation, beside one λ."""
-    X, U, groups = half_free(N_SAMPLES, N_STATES)
+    X, U, groups = draw_half_free(N_SAMPLES, N_STATES)
     times = []
     for alpha in (ALPHA, "cv"):
         start = time.perf_counter()
@@ -96,7 +96,7 @@ def wider() -> None:
 
 def main() -> None:
     n_samples, n_centers, alpha = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
-    X, U, groups = half_free(n_samples, N_STATES)
+    X, U, groups = draw_half_free(n_samples, N_STATES)
     policy = _policy(X, n_centers, alpha)
     start = time.perf_counter()
     with warnings.catch_warnings():

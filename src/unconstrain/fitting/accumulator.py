@@ -15,7 +15,7 @@ import numpy as np
 
 from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
-from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
+from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer, judge
 from unconstrain.fitting.corrected import CorrectedMoments, Part, add_up
 from unconstrain.fitting.correction import Correction
 from unconstrain.fitting.in_space import in_units
@@ -111,12 +111,18 @@ class Record:
         `fitting.calibration`.
     regression : Solution, optional
         Ordinary regression by the same model to the same samples, where inference began with it.
+    n_anew : int
+        How many samples there were when contact was last inferred anew, and not from a policy at hand.
+    beginning : str
+        Where a policy was given to go on from: whether it was, and if not, why.
     """
 
     log_likelihoods: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
     repeated: float = 0.0
     regression: Solution | None = None
+    n_anew: int = 0
+    beginning: str = ""
 
 
 class Accumulator:
@@ -161,6 +167,9 @@ class Accumulator:
     compared : tuple of tuple of Belief
         For "adaptive": beliefs whose likelihood is summed up, instead of moments; each one for all samples, or one for
         each fold.
+    predict : callable or None
+        For "adaptive": predicts the actions that samples are judged by, from states (N, n); None for the model with the
+        belief's parameters.
     """
 
     def __init__(
@@ -190,6 +199,7 @@ class Accumulator:
         self.is_judged = alpha == "cv"
         self.compared: tuple[tuple[Belief, ...], ...] = ()
         self.holds = False
+        self.predict: Callable[[np.ndarray], np.ndarray] | None = None
         self.total = Sums()
         # By fold, how coarse the boxes of earlier samples became: those of later ones need not begin finer.
         self._coarseness: list[int] = []
@@ -282,7 +292,10 @@ class Accumulator:
             moments = self._by_fold(samples, observation, counted, fold)
             return replace(counts, moments=moments, shortest=float(r.min(initial=math.inf, where=moves)))
         assert self.belief is not None
-        found = infer(self.model, self.belief, samples)
+        if self.predict is None:
+            found = infer(self.model, self.belief, samples)
+        else:
+            found = judge(self.predict(samples.states), self.belief, samples)
         moments = self._by_fold(samples, found.expand(), counted, fold)
         judges: tuple[Any, ...] = ()
         if self.is_judged:
@@ -345,7 +358,7 @@ class Accumulator:
             self.unit,
         )
         other.is_judged, other.compared = self.is_judged, self.compared
-        other.finds_region, other.holds = self.finds_region, self.holds
+        other.finds_region, other.holds, other.predict = self.finds_region, self.holds, self.predict
         return other
 
     def copy(self) -> "Accumulator":

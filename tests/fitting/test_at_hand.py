@@ -14,7 +14,7 @@ from unconstrain.policies.inferred import describe_inferred
 
 KINDS = {
     "linear": uc.ParametricPolicy,
-    "rbf": lambda: uc.ParametricPolicy(uc.NormalizedRBF(n_centers=9)),
+    "rbf": lambda: uc.ParametricPolicy(uc.NormalizedRBF(n_centers=16)),
     "local": lambda: uc.LocallyLinearPolicy(n_centers=15),
 }
 
@@ -38,12 +38,12 @@ def _passes(policy):
 def test_after_one_more_episode_the_answer_is_that_of_a_fit_anew_in_fewer_passes(demos, anew, kind):
     before = KINDS[kind]().fit(demos.select(demos.episodes != 3))
     warm = KINDS[kind]().fit(demos, start=before)
-    assert "from the policy at hand" in describe_inferred(warm)
+    assert "contact was inferred from the policy at hand" in describe_inferred(warm)
     assert warm.log_likelihood_ > anew(kind).log_likelihood_ - NOTICEABLE
     P = anew(kind).predict(demos.states)
     apart = np.sqrt(np.mean((P - warm.predict(demos.states)) ** 2))
     assert apart < 0.02 * np.sqrt(np.mean(P**2))
-    assert _passes(warm) < _passes(anew(kind))
+    assert _passes(warm) < 0.5 * _passes(anew(kind))
 
 
 @pytest.mark.parametrize("factor", [-2.0, 0.5])

@@ -144,7 +144,7 @@ def test_what_is_done_and_left_is_on_a_terminal_once_it_lasts(monkeypatch, delay
     else:
         assert "part [b]of it" in stream.getvalue()
         assert "3 of 4 steps" in stream.getvalue()
-        assert "0:00:0" in stream.getvalue()
+        assert "0:00:00 left" in stream.getvalue()
 
 
 def test_loops_in_other_threads_are_not_shown_and_do_no_harm(seen):

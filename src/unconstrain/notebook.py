@@ -84,6 +84,10 @@ class NotebookBar:
         self._text, self._begun, self._unit = text, None, self._unit if unit is None else unit
         self._show(f"<progress></progress> {html.escape(text)}")
 
+    def rename(self, text: str) -> None:
+        """Say what is done from now on, as a part of what was begun."""
+        self._text = text
+
     def clear(self) -> None:
         """Show nothing any more."""
         self._show("")

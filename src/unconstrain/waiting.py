@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
+from datetime import timedelta
 from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
@@ -50,10 +51,17 @@ class _Row:
 
     def __init__(self, bars: Any, text: str, total: int | None, unit: str) -> None:
         self._bars, self._unit = bars, unit
-        self.task = bars.add_task(text, total=total, told="" if total is None else self._tell(0, total))
+        self._begun = time.monotonic()
+        told = "" if total is None else self._tell(0, total)
+        self.task = bars.add_task(text, total=total, told=told, left="")
 
     def __call__(self, done: int, total: int | None = None) -> None:
-        self._bars.update(self.task, completed=done, total=total, told=self._tell(done, total))
+        left = ""
+        if total and 0 < done < total:
+            # Not by rich's own column, which begins anew whenever the total is seen to be another.
+            seconds = (time.monotonic() - self._begun) * (total - done) / done
+            left = f"{timedelta(seconds=round(seconds))} left"
+        self._bars.update(self.task, completed=done, total=total, told=self._tell(done, total), left=left)
 
     def begin(self, text: str) -> None:
         self._bars.update(self.task, description=text, refresh=True)
@@ -68,7 +76,7 @@ class _Terminal:
 
     def __init__(self) -> None:
         from rich.console import Console  # rich takes a while to import, and is not always needed
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TextColumn
 
         class Late(Progress):
             def get_renderables(self) -> Iterable[Any]:
@@ -76,10 +84,11 @@ class _Terminal:
                 counted = [task for task in self.tasks if task.fields["told"] or task is self.tasks[0]]
                 return [self.make_tasks_table([task for task in counted if (task.elapsed or 0.0) >= DELAY])]
 
-        text, told = (
-            TextColumn(form, markup=False) for form in ("{task.description}", "{task.fields[told]}")
+        text, told, left = (
+            TextColumn(form, markup=False)
+            for form in ("{task.description}", "{task.fields[told]}", "{task.fields[left]}")
         )
-        columns = (text, BarColumn(), told, TimeRemainingColumn())
+        columns = (text, BarColumn(), told, left)
         self._bars = Late(*columns, console=Console(stderr=True), transient=True)
         self._lock, self._ended = threading.Lock(), False
         self._timer = threading.Timer(DELAY, self._start)
@@ -127,16 +136,17 @@ class _Cell:
 
     def __init__(self) -> None:
         self._bar: NotebookBar | None = None
-        self._shown: tuple[Any, str] | None = None
+        self._shown: _CellRow | None = None
 
     def open(self, text: str, total: int | None, unit: str) -> Stage:
         return _CellRow(self, text, unit)
 
     def show(self, row: _CellRow, text: str, unit: str, done: int, total: int | None) -> None:
         self._bar = self._bar or NotebookBar(unit)
-        if self._shown != (row, text):
-            self._shown = (row, text)
+        if self._shown is not row:
+            self._shown = row
             self._bar.begin(text, unit)
+        self._bar.rename(text)
         self._bar(done, total)
 
     def close(self, row: Any) -> None:

@@ -1,5 +1,7 @@
 """Going on from a policy at hand ends where a fit anew ends, or is given up for one."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -25,23 +27,23 @@ def demos():
 
 @pytest.fixture(scope="module")
 def anew(demos):
-    return {kind: make().fit(demos) for kind, make in KINDS.items()}
+    return cache(lambda kind: KINDS[kind]().fit(demos))
 
 
 def _passes(policy):
     return sum(entry["run"] != "all constrained" for entry in policy.history_)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["rbf", "local"])
 def test_after_one_more_episode_the_answer_is_that_of_a_fit_anew_in_fewer_passes(demos, anew, kind):
     before = KINDS[kind]().fit(demos.select(demos.episodes != 3))
     warm = KINDS[kind]().fit(demos, start=before)
-    assert "from the policy at hand" in describe_inferred(warm)
-    assert warm.log_likelihood_ > anew[kind].log_likelihood_ - NOTICEABLE
-    P = anew[kind].predict(demos.states)
+    assert "contact was inferred from the policy at hand" in describe_inferred(warm)
+    assert warm.log_likelihood_ > anew(kind).log_likelihood_ - NOTICEABLE
+    P = anew(kind).predict(demos.states)
     apart = np.sqrt(np.mean((P - warm.predict(demos.states)) ** 2))
     assert apart < 0.02 * np.sqrt(np.mean(P**2))
-    assert _passes(warm) < 0.5 * _passes(anew[kind])
+    assert _passes(warm) < 0.5 * _passes(anew(kind))
 
 
 @pytest.mark.parametrize("factor", [-2.0, 0.5])
@@ -49,24 +51,24 @@ def test_from_a_policy_of_something_else_the_answer_is_no_worse(demos, anew, fac
     # Half as long, actions are likelier than any explanation of these can be.
     wrong = KINDS["linear"]().fit(demos.states, factor * demos.actions, groups=demos.episodes)
     warm = KINDS["linear"]().fit(demos, start=wrong)
-    assert warm.log_likelihood_ > anew["linear"].log_likelihood_ - NOTICEABLE
+    assert warm.log_likelihood_ > anew("linear").log_likelihood_ - NOTICEABLE
     if factor == 0.5:
         assert LESS_LIKELY in describe_inferred(warm)
-        np.testing.assert_array_equal(warm.weights_, anew["linear"].weights_)
+        np.testing.assert_array_equal(warm.weights_, anew("linear").weights_)
 
 
 def test_where_no_contact_was_found_there_is_nothing_to_go_on_from(demos):
     X = demos.states
-    U = np.tanh(X) + 0.05 * np.random.default_rng(0).standard_normal(X.shape)
-    before = uc.ParametricPolicy(uc.NormalizedRBF(n_centers=9)).fit(X, U, groups=demos.episodes)
-    warm = uc.ParametricPolicy(uc.NormalizedRBF(n_centers=9)).fit(X, U, groups=demos.episodes, start=before)
+    U = -X + 0.05 * np.random.default_rng(0).standard_normal(X.shape)
+    before = uc.ParametricPolicy().fit(X, U, groups=demos.episodes)
+    warm = uc.ParametricPolicy().fit(X, U, groups=demos.episodes, start=before)
     assert ALL_FREE in describe_inferred(warm)
     np.testing.assert_array_equal(warm.weights_, before.weights_)
 
 
 def test_the_growth_is_counted_from_the_last_fit_anew_not_from_the_last_fit(demos):
     policy = uc.ParametricPolicy().fit(demos.select(demos.episodes < 11))
-    for episodes in (14, 18, 23):
+    for episodes in (18, 23):
         policy.fit(demos.select(demos.episodes < episodes), start=policy)
         assert (GROWN in describe_inferred(policy)) == (episodes == 23)
 

@@ -1,6 +1,6 @@
 """A large symmetric matrix reduced to few diagonals at the speed of matrix multiplication.
 
-Three diagonals (`tridiagonal`) cost one product of the matrix with a vector for each row, and where a matrix does not fit
+Three diagonals (`tridiagonal`) cost a product of the matrix with a vector for each row, and where a matrix does not fit
 into the processor's cache each product costs reading it. `H = Q B Qᵀ` with b diagonals beside the main one costs one
 product with b vectors for b rows: each of P/b steps makes zeros below a block of b columns by b reflections
 

@@ -1,6 +1,6 @@
 """Solutions of moments for many λ, among which λ is chosen by cross-validation.
 
-With eigenvectors of H any λ costs one product (`Spectrum`). But all that is needed is an orthogonal basis in which H + λI
+With eigenvectors of H any λ is one product (`Spectrum`). But all that is needed is an orthogonal basis in which H + λI
 is easily solved, and one in which H has few diagonals costs a quarter of eigenvectors (`tridiagonal`, `banded`).
 
 Directions that no sample shows, but for rounding, are not told apart from others here: they decay to t as any other,

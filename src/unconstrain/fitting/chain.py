@@ -132,75 +132,112 @@ def smooth(
     T = chain.transitions
     first = np.array([chain.free_share, 1 - chain.free_share])
     top = np.maximum(log_free, log_constrained)
-    relative = np.stack([log_free, log_constrained], axis=1) - top[:, None]
+    relative = np.stack([log_free, log_constrained]) - top
     # What is known stays certain, however strongly the neighbours speak against it.
     likelihood = np.where(np.isneginf(relative), 0.0, np.exp(np.maximum(relative, -MOST_TELLING)))
     omega = np.ones_like(top) if weights is None else weights
-    moves = np.broadcast_to(T, (len(top), 2, 2)).copy()
-    if log_kept is not None:
-        moves[:, CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))
-    steps = moves * likelihood[:, None, :]
-    # The first sample of an episode forgets what was before.
-    steps[starts] = (first * likelihood[starts])[:, None, :]
-    alone = starts.all()
-    if alone:
-        joint = first * likelihood
-        norm = joint.sum(axis=1)
-        free = joint[:, FREE] / norm
+    if starts.all():
+        joint = first[:, None] * likelihood
+        norm = joint.sum(axis=0)
+        free = joint[FREE] / norm
         states = np.array([omega @ free, omega @ (1 - free)])
         return free, top + np.log(norm), Counts(states, np.zeros((2, 2))), np.zeros_like(free)
-    ahead = _sweep(steps)
-    behind = np.empty_like(ahead)
-    behind[-1] = 0.5
-    behind[:-1] = _sweep(steps[:0:-1].swapaxes(1, 2))[::-1]
+    # A row a pair of states: what follows is then one operation on all samples.
+    moves = np.repeat(T[:, :, None], len(top), axis=2)
+    if log_kept is not None:
+        moves[CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))
+    steps = moves * likelihood
+    # The first sample of an episode forgets what was before.
+    steps[:, :, starts] = (first[:, None] * likelihood[:, starts])[None]
+    ahead, behind = _sweep_both_ways(steps)
     before = np.empty_like(ahead)
-    before[1:] = np.einsum("ni,nij->nj", ahead[:-1], moves[1:])
-    before[starts] = first
-    log_likelihood = top + np.log(np.einsum("nk,nk->n", before, likelihood))
+    before[:, 1:] = ahead[0, :-1] * moves[0, :, 1:] + ahead[1, :-1] * moves[1, :, 1:]
+    before[:, starts] = first[:, None]
+    log_likelihood = top + np.log(before[0] * likelihood[0] + before[1] * likelihood[1])
     both = ahead * behind
-    both /= both.sum(axis=1, keepdims=True)
+    both /= both[0] + both[1]
     if not counts:
-        return both[:, FREE], log_likelihood, Counts(omega @ both, np.zeros((2, 2))), np.zeros_like(top)
-    inner = np.flatnonzero(~starts)
-    pairs = ahead[inner - 1][:, :, None] * moves[inner] * (likelihood * behind)[inner][:, None, :]
-    pairs /= pairs.sum(axis=(1, 2), keepdims=True)
+        return both[FREE], log_likelihood, Counts(both @ omega, np.zeros((2, 2))), np.zeros_like(top)
+    pairs = ahead[:, None, :-1] * moves[:, :, 1:] * (likelihood * behind)[:, 1:]
+    pairs = np.where(starts[1:], 0.0, pairs)
+    total = pairs.reshape(4, -1).sum(axis=0)
+    pairs /= np.where(starts[1:], 1.0, total)
     kept = np.zeros_like(top)
-    kept[inner] = pairs[:, CONSTRAINED, CONSTRAINED]
-    changes = np.einsum("n,nij->ij", omega[inner], pairs)
-    return both[:, FREE], log_likelihood, Counts(omega @ both, changes), kept
+    kept[1:] = pairs[CONSTRAINED, CONSTRAINED]
+    return both[FREE], log_likelihood, Counts(both @ omega, pairs @ omega[1:]), kept
 
 
-def _sweep(steps: Floats) -> Floats:
-    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for M (N, 2, 2).
+def _sweep_both_ways(steps: Floats) -> tuple[Floats, Floats]:
+    """Compute rows `r_t = r_{t-1} M_t` and columns `c_t = M_{t+1} c_{t+1}`, each scaled to sum to one.
 
-    The steps are cut into pieces of about √N, and all pieces advance side by side: first each one's product, then the
-    row that each begins with, then the rows within.
+    Parameters
+    ----------
+    steps : ndarray of shape (2, 2, N)
+        M.
+
+    Returns
+    -------
+    rows : ndarray of shape (2, N)
+        From (1/2, 1/2) before the first step.
+    columns : ndarray of shape (2, N)
+        Of which the last is (1/2, 1/2).
     """
-    N = len(steps)
+    N = steps.shape[2]
     compiled = loops.load_for(N, "chain")
+    columns = np.empty((2, N))
+    columns[:, -1] = 0.5
     if compiled is not None:
-        swept = np.empty((N, 2))
-        compiled.sweep(steps, swept)
-        return swept
-    length = max(1, int(np.sqrt(N)))
-    n_pieces = -(-N // length)
-    padded = np.empty((n_pieces * length, 2, 2))
-    padded[:N], padded[N:] = steps, np.eye(2)
-    pieces = padded.reshape(n_pieces, length, 2, 2)
-    product = pieces[:, 0].copy()
+        one_by_one, rows, swept = steps.transpose(2, 0, 1).copy(), np.empty((N, 2)), np.empty((N - 1, 2))
+        compiled.sweep(one_by_one, rows)
+        compiled.sweep(one_by_one[:0:-1].swapaxes(1, 2), swept)
+        columns[:, :-1] = swept[::-1].T
+        return rows.T, columns
+    ahead, back = _sweep(steps, steps[:, :, :0:-1].swapaxes(0, 1))
+    columns[:, :-1] = back[:, ::-1]
+    return ahead, columns
+
+
+def _sweep(*sequences: Floats) -> list[Floats]:
+    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for sequences of M (2, 2, N).
+
+    Each sequence is cut into pieces of about √N, and all pieces advance side by side: first each one's product, then
+    the row that each begins with, then the rows within.
+    """
+    length = max(1, int(np.sqrt(sequences[0].shape[2])))
+    numbers = [-(-sequence.shape[2] // length) for sequence in sequences]
+    pieces = np.concatenate(
+        [_cut(sequence, length, number) for sequence, number in zip(sequences, numbers, strict=True)], axis=3
+    )
+    product = pieces[0]
     for t in range(1, length):
-        product = product @ pieces[:, t]
-        product /= product.max(axis=(1, 2), keepdims=True)
-    row = np.array([0.5, 0.5])
-    begins = np.empty((n_pieces, 2))
-    for i in range(n_pieces):
-        begins[i] = row
-        row = row @ product[i]
-        row /= row.sum()
-    rows = np.empty((n_pieces, length, 2))
-    current = begins
+        product = product[:, 0, None] * pieces[t, 0] + product[:, 1, None] * pieces[t, 1]
+        product /= np.maximum.reduce(product.reshape(4, -1))
+    ends = np.cumsum(numbers)
+    begins = np.concatenate([_begins(part) for part in np.split(product, ends[:-1], axis=2)], axis=1)
+    rows, current = np.empty((length, *begins.shape)), begins
     for t in range(length):
-        current = np.einsum("ij,ijk->ik", current, pieces[:, t])
-        current /= current.sum(axis=1, keepdims=True)
-        rows[:, t] = current
-    return rows.reshape(-1, 2)[:N]
+        current = np.add(current[0] * pieces[t, 0], current[1] * pieces[t, 1], out=rows[t])
+        current /= current[0] + current[1]
+    return [
+        part.transpose(1, 2, 0).reshape(2, -1)[:, : sequence.shape[2]]
+        for part, sequence in zip(np.split(rows, ends[:-1], axis=2), sequences, strict=True)
+    ]
+
+
+def _cut(sequence: Floats, length: int, number: int) -> Floats:
+    """Cut matrices (2, 2, N) into pieces, (length, 2, 2, number), the last of which ends with identities."""
+    N = sequence.shape[2]
+    padded = np.empty((2, 2, number * length))
+    padded[:, :, :N], padded[:, :, N:] = sequence, np.eye(2)[:, :, None]
+    return np.ascontiguousarray(padded.reshape(2, 2, number, length).transpose(3, 0, 1, 2))
+
+
+def _begins(products: Floats) -> Floats:
+    """Compute the rows (2, K) that pieces begin with, given the product of each, (2, 2, K)."""
+    a = b = 0.5
+    begins = []
+    for (aa, ab), (ba, bb) in products.transpose(2, 0, 1).tolist():
+        begins.append((a, b))
+        first, second = a * aa + b * ba, a * ab + b * bb
+        a, b = first / (first + second), second / (first + second)
+    return np.array(begins).reshape(-1, 2).T

@@ -100,8 +100,9 @@ class LocalModels:
         for start in range(0, len(X), BLOCK_ROWS):
             block = X[start : start + BLOCK_ROWS]
             blend = normalized_activations(block, self.centers, self.width)
-            local = self._evaluate_each(block, w)
-            actions[start : start + BLOCK_ROWS] = np.einsum("nm,nmd->nd", blend, local)
+            actions[start : start + BLOCK_ROWS] = np.einsum(
+                "nm,nmd->nd", blend, self._evaluate_each(block, w)
+            )
         return actions
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:

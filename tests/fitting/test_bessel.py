@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.special import gammaln, ive
 
-from unconstrain.fitting.sphere import scaled_bessel
+from unconstrain.fitting.bessel import scaled_bessel
 
 
 @pytest.mark.parametrize("d", [2, 3, 6, 7, 14, 32, 33])

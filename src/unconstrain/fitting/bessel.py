@@ -1,8 +1,7 @@
 """How the mean of an exponential over a sphere grows: modified Bessel functions, without their scale.
 
 They are exact from a series, from SciPy's, or from an expansion, by how large κ is. SciPy's take half a microsecond,
-and are interpolated instead: by polynomials of the fifth degree in log κ that share value, slope and curvature with
-them at a thousand places, which is as exact.
+and are interpolated instead (`bessel_table`).
 
 References
 ----------
@@ -10,10 +9,11 @@ Amos, Computation of modified Bessel functions and their ratios, Mathematics of 
 """
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from unconstrain.fitting.bessel_table import STEP, Table
 
 SERIES_TERMS = 1000
 """More than the power series takes wherever the Bessel function itself underflows."""
@@ -26,23 +26,10 @@ TERMS = 20
 
 NEGLIGIBLE = 1e-18
 
-PIECES = 1024
-"""Of the interpolation, a hundredth of κ each."""
-
 MOST_DIMENSIONS = 64
 """Up to which values are interpolated: in hundreds, they are only exact to 1e-10 themselves."""
 
 Floats = NDArray[np.float64]
-
-
-class _Table(NamedTuple):
-    """Polynomials (6, 2, PIECES) of both functions, by the place of log κ within a piece, from `least` to `most`."""
-
-    polynomials: Floats
-    least: float
-    most: float
-    begin: float
-    step: float
 
 
 def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
@@ -70,19 +57,14 @@ def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
     if d > MOST_DIMENSIONS:
         return compute_scaled_bessel(d, kappa)
     table = _table(d)
-    inside = (kappa > table.least) & (kappa < table.most)
-    found = np.empty((2, len(kappa)))
-    place = (np.log(kappa[inside]) - table.begin) / table.step
-    piece = np.clip(place.astype(np.intp), 0, PIECES - 1)
-    place -= piece
-    value = table.polynomials[-1][:, piece]
-    for coefficients in table.polynomials[-2::-1]:
-        value *= place
-        value += coefficients[:, piece]
-    found[:, inside] = value
-    if not inside.all():
-        found[:, ~inside] = compute_scaled_bessel(d, kappa[~inside])
-    return found[0], found[1]
+    inside = (kappa >= table.begin) & (kappa < table.end)
+    if inside.all():
+        log_mean, short = table(kappa)
+        return log_mean, short
+    log_mean, short = np.empty_like(kappa), np.empty_like(kappa)
+    log_mean[inside], short[inside] = table(kappa[inside])
+    log_mean[~inside], short[~inside] = compute_scaled_bessel(d, kappa[~inside])
+    return log_mean, short
 
 
 def compute_scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
@@ -127,31 +109,9 @@ def compute_scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
 
 
 @cache
-def _table(d: int) -> _Table:
-    """Interpolate between exact values; derivatives follow from `A' = 1 - A² - (d - 1) A / κ` for A = 1 - short."""
-    least, most = 1e-4 * np.sqrt(d), FAR + max(d / 2 - 1, 1.0) ** 2 / 2
-    begin, end = np.log(least), np.log(most)
-    kappa, h = np.exp(np.linspace(begin, end, PIECES + 1)), (end - begin) / PIECES
-    log_mean, short = compute_scaled_bessel(d, kappa)
-    A = 1 - short
-    slope = 1 - A**2 - (d - 1) * A / kappa
-    bend = -2 * A * slope - (d - 1) * (slope / kappa - A / kappa**2)
-    values = np.stack([log_mean, short])
-    slopes = h * kappa * np.stack([-short, -slope])  # by the place within a piece, as all below
-    bends = h * slopes + (h * kappa) ** 2 * np.stack([slope, -bend])
-    half = bends / 2
-    rise = np.diff(values) - slopes[:, :-1] - half[:, :-1]
-    turn = np.diff(slopes) - bends[:, :-1]
-    curl = np.diff(half)
-    polynomials = [
-        values[:, :-1],
-        slopes[:, :-1],
-        half[:, :-1],
-        10 * rise - 4 * turn + curl,
-        -15 * rise + 7 * turn - 2 * curl,
-        6 * rise - 3 * turn + curl,
-    ]
-    return _Table(np.stack(polynomials), float(least), float(most), float(begin), float(h))
+def _table(d: int) -> Table:
+    far = FAR + max(d / 2 - 1, 1.0) ** 2 / 2
+    return Table.of(lambda kappa: compute_scaled_bessel(d, kappa), STEP, STEP * (far // STEP + 1))
 
 
 def _series(nu: float, kappa: Floats) -> tuple[Floats, Floats]:

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from unconstrain.features.base import Decaying, Features, FullBasis
 from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.path import Path
 
 SHARE = 1e-3
 """Of λ by which intercepts decay, and by which the policy of all data does that local models decay to.
@@ -38,7 +39,7 @@ pulled to it, it would say "do not move" again.
 
 @runtime_checkable
 class Solutions(Protocol):
-    """Moments decomposed so that every λ costs one product."""
+    """Moments made ready to be solved for many λ."""
 
     def solve(self, alphas: ArrayLike) -> np.ndarray:
         """Solve for several λ (L,): parameters (..., P, L, K)."""
@@ -113,7 +114,7 @@ class Decay:
         return self.restore(self._solve(standard, alpha * self.scale))
 
     def decompose(self, moments: Moments) -> Solutions:
-        """Decompose moments, which solves for every λ at once.
+        """Make moments ready to be solved for many λ above zero.
 
         Parameters
         ----------
@@ -189,11 +190,11 @@ class Decay:
 
     def _decompose(self, standard: Moments) -> Callable[[np.ndarray], np.ndarray]:
         if standard.everywhere is not None:
-            of_all, spectrum = self._decompose(standard.everywhere), standard.decompose()
-            return lambda decays: spectrum.solve(decays, of_all(SHARE * decays))
+            of_all, path = self._decompose(standard.everywhere), Path.of(standard)
+            return lambda decays: path.solve(decays, of_all(SHARE * decays))
         size = self._sizes(standard)
-        spectrum = _resized(standard, size).decompose()
-        return lambda decays: size[:, None, None] * spectrum.solve(decays)
+        path = Path.of(_resized(standard, size))
+        return lambda decays: size[:, None, None] * path.solve(decays)
 
     def _sizes(self, standard: Moments) -> np.ndarray:
         """Compute how large each parameter (P,) may be beside others for the same decay, `d_p^(-1/2)`."""
@@ -216,6 +217,8 @@ class _Restored:
 
 def _resized(moments: Moments, size: np.ndarray) -> Moments:
     """Turn moments of w into those of w / size."""
+    if (size == 1.0).all():
+        return moments
     return replace(moments, H=moments.H * size * size[:, None], g=moments.g * size[:, None])
 
 

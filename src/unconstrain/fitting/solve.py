@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from unconstrain.errors import DataError
-from unconstrain.fitting.corrected import Part, add_up
+from unconstrain.fitting.corrected import Part
 from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
 
@@ -134,7 +134,7 @@ def choose_alpha(
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Choose the λ with the least risk on folds left out one at a time, or the largest that is as good.
 
-    Each fold costs one eigendecomposition of the others' sum, whatever the number of λ. Local models, stacked in
+    Each fold costs one reduction of the others' sum (`path`), whatever the number of λ. Local models, stacked in
     each `Moments`, share one λ: their held-out risks, weighted by their receptive fields, are added.
 
     Parameters
@@ -170,13 +170,26 @@ def choose_alpha(
         raise DataError(ONE_FOLD)
     alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS)
     error = np.zeros(N_ALPHAS)
-    for i, held_out in enumerate(judges):
-        train = observed(add_up(folds[:i] + folds[i + 1 :]))
+    for held_out, others in zip(judges, _leave_one_out(folds), strict=True):
+        train = observed(others)
         candidates = decay_of(train).decompose(train).solve(alphas)
         error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
     error /= sum(float(fold.weight.sum()) for fold in folds)
     as_good = error <= (1 + INDISTINGUISHABLE) * error.min()
     return float(alphas[as_good].max()), alphas, error
+
+
+def _leave_one_out(folds: Sequence[Any]) -> Iterator[Any]:
+    """Add up all folds but one at a time; two sums more than folds, where each by itself would be their square."""
+    after: list[Any] = [folds[-1]]
+    for fold in reversed(folds[1:-1]):
+        after.append(fold + after[-1])
+    yield after.pop()
+    before = folds[0]
+    for fold in folds[1:-1]:
+        yield before + after.pop()
+        before = before + fold
+    yield before
 
 
 def splits(n_samples: int, groups: np.ndarray | None = None) -> Iterator[tuple[np.ndarray, np.ndarray]]:

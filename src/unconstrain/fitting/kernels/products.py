@@ -113,6 +113,7 @@ def unfold(products: np.ndarray, M: int, d: int) -> np.ndarray:
     ndarray of shape (..., dM, dM)
         H.
     """
-    over_q = products[..., pair_index(d)]  # (..., pairs of b, d, d)
-    full = np.moveaxis(over_q, -3, -1)[..., pair_index(M)]  # (..., d, d, M, M)
-    return np.ascontiguousarray(full.swapaxes(-2, -3)).reshape(*products.shape[:-2], d * M, d * M)
+    k, j = pair_index(M)[None, :, None, :], pair_index(d)[:, None, :, None]
+    index = (k * n_pairs(d) + j).reshape(d * M, d * M)
+    # One pass over H, which of many large models is larger than the processor's cache by far.
+    return products.reshape(*products.shape[:-2], -1).take(index, axis=-1)

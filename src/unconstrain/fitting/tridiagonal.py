@@ -1,0 +1,172 @@
+"""Symmetric matrices reduced to three diagonals, after which every λ costs next to nothing.
+
+`H = Q T Qᵀ` with Q orthogonal and T tridiagonal is a quarter of the work of eigenvectors, and solves for many λ too:
+`(H + λI)⁻¹ y = Q (T + λI)⁻¹ Qᵀ y`. The middle is one recursion over P rows, for all matrices and all λ side by side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from unconstrain.parallel import map_shares
+
+ROUNDING = 10 * np.finfo(np.float64).eps
+"""Pivots below that share of the largest entry say no more than rounding does."""
+
+SMALL = 128
+"""Parameters up to which Q is formed: batches of products are then faster than LAPACK's reflections, model by model."""
+
+
+@dataclass(frozen=True)
+class Tridiagonal:
+    """Matrices H of S models, reduced.
+
+    Parameters
+    ----------
+    basis : ndarray of shape (S, P, P), or list of ndarray of shape (P - 1, P - 1)
+        Q where P is small; else what LAPACK holds of it, reflectors below the diagonals.
+    factors : ndarray of shape (S, P - 1)
+        Of the reflectors.
+    diagonal : ndarray of shape (S, P)
+        Of T.
+    beside : ndarray of shape (S, P - 1)
+        What stands beside the diagonal.
+    """
+
+    basis: np.ndarray | list[np.ndarray]
+    factors: np.ndarray
+    diagonal: np.ndarray
+    beside: np.ndarray
+
+    @classmethod
+    def of(cls, H: np.ndarray) -> "Tridiagonal":
+        """Reduce matrices.
+
+        Parameters
+        ----------
+        H : ndarray of shape (S, P, P)
+            Symmetric; P is at least two.
+
+        Returns
+        -------
+        Tridiagonal
+            Of them.
+        """
+        from scipy.linalg.lapack import dorgqr, dsytrd, dsytrd_lwork
+
+        S, P = H.shape[:2]
+        lwork = int(dsytrd_lwork(P, lower=1)[0])
+        diagonal, beside, factors = np.empty((S, P)), np.empty((S, P - 1)), np.empty((S, P - 1))
+        basis: Any = [None] * S
+        if P <= SMALL:
+            basis = np.zeros((S, P, P))
+            basis[:, 0, 0] = 1.0
+        # SciPy keeps the interpreter here, so threads would wait for each other; BLAS may use its own.
+        for m in range(S):
+            held, diagonal[m], beside[m], factors[m], _ = dsytrd(H[m].T, lower=1, lwork=lwork)
+            if P <= SMALL:
+                basis[m, 1:, 1:] = dorgqr(held[1:, :-1], factors[m], overwrite_a=1)[0]
+            else:
+                basis[m] = np.asfortranarray(held[1:, :-1])
+        return cls(basis, factors, diagonal, beside)
+
+    def solve(self, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
+        """Solve `(H + λI) w = y` for several λ.
+
+        Parameters
+        ----------
+        decays : ndarray of shape (L,)
+            λ, all above zero.
+        pulls : ndarray of shape (S, P, L or 1, K)
+            y, for each λ or the same for all.
+
+        Returns
+        -------
+        ndarray of shape (S, P, L, K)
+            w.
+        """
+        S, P, K = len(pulls), pulls.shape[1], pulls.shape[-1]
+        turned = self._multiply("T", pulls.reshape(S, P, -1)).reshape(pulls.shape)
+        solved, is_clear = _solve(self.diagonal, self.beside, decays, turned)
+        for m in np.flatnonzero(~is_clear.all(axis=1)):
+            rows = ~is_clear[m]
+            own = turned[m] if turned.shape[2] == 1 else turned[m][:, rows]
+            solved[m][:, rows] = self._solve_by_eigenvectors(int(m), decays[rows], own)
+        columns = solved.transpose(1, 0, 2, 3).reshape(P, S, -1).transpose(1, 0, 2)
+        return self._multiply("N", columns).reshape(S, P, len(decays), K)
+
+    def _multiply(self, form: str, columns: np.ndarray) -> np.ndarray:
+        """Multiply Q ("N"), or its transpose ("T"), by columns (S, P, C)."""
+        from scipy.linalg.lapack import dormqr
+
+        if isinstance(self.basis, np.ndarray):
+            return (self.basis if form == "N" else self.basis.swapaxes(1, 2)) @ columns
+        basis, C = self.basis, columns.shape[2]
+        product = np.empty(columns.shape)
+        product[:, 0] = columns[:, 0]
+
+        def share(models: Sequence[int]) -> None:
+            for m in models:
+                # With the least workspace reflections are applied one by one, which for few columns is faster.
+                product[m, 1:] = dormqr("L", form, basis[m], self.factors[m], columns[m, 1:], C)[0]
+
+        map_shares(share, range(len(columns)))
+        return product
+
+    def _solve_by_eigenvectors(self, m: int, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
+        """Solve where rounding has left eigenvalues below zero, which are taken for zero."""
+        from scipy.linalg import eigh_tridiagonal
+
+        values, vectors = eigh_tridiagonal(self.diagonal[m], self.beside[m])
+        return solve_by_eigenvectors(values, vectors, decays, pulls)
+
+
+def solve_by_eigenvectors(
+    values: np.ndarray, vectors: np.ndarray, decays: np.ndarray, pulls: np.ndarray
+) -> np.ndarray:
+    """Solve `(H + λI) w = y` with eigenvalues below zero taken for zero.
+
+    Parameters
+    ----------
+    values : ndarray of shape (P,)
+        Eigenvalues of H.
+    vectors : ndarray of shape (P, P)
+        Eigenvectors of H.
+    decays : ndarray of shape (L,)
+        λ, all above zero.
+    pulls : ndarray of shape (P, L or 1, K)
+        y.
+
+    Returns
+    -------
+    ndarray of shape (P, L, K)
+        w.
+    """
+    along = np.tensordot(vectors.T, pulls, 1) / (np.maximum(values, 0.0)[:, None] + decays)[:, :, None]
+    return np.tensordot(vectors, along, 1)
+
+
+def _solve(
+    diagonal: np.ndarray, beside: np.ndarray, decays: np.ndarray, pulls: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve by `LDLᵀ`; returns solutions (S, P, L, K), and where (S, L) all pivots are clear of rounding."""
+    S, P, _, K = pulls.shape
+    y = pulls.transpose(1, 0, 2, 3)
+    a, e = diagonal.T[:, :, None] + decays, beside.T[:, :, None]
+    pivots, ratios, x = a, np.empty((P - 1, S, len(decays))), np.empty((P, S, len(decays), K))
+    x[0] = y[0]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for i in range(1, P):
+            np.divide(e[i - 1], pivots[i - 1], out=ratios[i - 1])
+            pivots[i] -= ratios[i - 1] * e[i - 1]
+            np.subtract(y[i], ratios[i - 1, :, :, None] * x[i - 1], out=x[i])
+        x /= pivots[..., None]
+        for i in range(P - 2, -1, -1):
+            x[i] -= ratios[i, :, :, None] * x[i + 1]
+    largest = np.abs(diagonal).max(axis=1)
+    is_clear = (pivots > ROUNDING * largest[:, None]).all(
+        axis=0
+    )  # where a pivot is no number, it is not above
+    return x.transpose(1, 0, 2, 3), is_clear

@@ -145,10 +145,7 @@ def smooth(
         free = joint[:, FREE] / norm
         states = np.array([omega @ free, omega @ (1 - free)])
         return free, top + np.log(norm), Counts(states, np.zeros((2, 2))), np.zeros_like(free)
-    ahead = _sweep(steps)
-    behind = np.empty_like(ahead)
-    behind[-1] = 0.5
-    behind[:-1] = _sweep(steps[:0:-1].swapaxes(1, 2))[::-1]
+    ahead, behind = _sweep_both_ways(steps)
     before = np.empty_like(ahead)
     before[1:] = np.einsum("ni,nij->nj", ahead[:-1], moves[1:])
     before[starts] = first
@@ -164,37 +161,76 @@ def smooth(
     return both[:, FREE], log_likelihood, Counts(omega @ both, changes), kept
 
 
-def _sweep(steps: Floats) -> Floats:
-    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for M (N, 2, 2).
+def _sweep_both_ways(steps: Floats) -> tuple[Floats, Floats]:
+    """Compute rows `r_t = r_{t-1} M_t` and columns `c_t = M_{t+1} c_{t+1}`, each scaled to sum to one.
 
-    The steps are cut into pieces of about √N, and all pieces advance side by side: first each one's product, then the
-    row that each begins with, then the rows within.
+    Parameters
+    ----------
+    steps : ndarray of shape (N, 2, 2)
+        M.
+
+    Returns
+    -------
+    rows : ndarray of shape (N, 2)
+        From (1/2, 1/2) before the first step.
+    columns : ndarray of shape (N, 2)
+        Of which the last is (1/2, 1/2).
     """
     N = len(steps)
     compiled = loops.load_for(N, "chain")
+    backwards = steps[:0:-1].swapaxes(1, 2)
+    columns = np.empty((N, 2))
+    columns[-1] = 0.5
     if compiled is not None:
-        swept = np.empty((N, 2))
-        compiled.sweep(steps, swept)
-        return swept
-    length = max(1, int(np.sqrt(N)))
-    n_pieces = -(-N // length)
-    padded = np.empty((n_pieces * length, 2, 2))
-    padded[:N], padded[N:] = steps, np.eye(2)
-    pieces = padded.reshape(n_pieces, length, 2, 2)
-    product = pieces[:, 0].copy()
+        rows, swept = np.empty((N, 2)), np.empty((N - 1, 2))
+        compiled.sweep(steps, rows)
+        compiled.sweep(backwards, swept)
+    else:
+        rows, swept = _sweep(steps, backwards)
+    columns[:-1] = swept[::-1]
+    return rows, columns
+
+
+def _sweep(*sequences: Floats) -> list[Floats]:
+    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for sequences of M (N, 2, 2).
+
+    Each sequence is cut into pieces of about √N, and all pieces advance side by side: first each one's product, then
+    the row that each begins with, then the rows within.
+    """
+    length = max(1, int(np.sqrt(len(sequences[0]))))
+    numbers = [-(-len(sequence) // length) for sequence in sequences]
+    pieces = np.concatenate(
+        [_cut(sequence, length, number) for sequence, number in zip(sequences, numbers, strict=True)], axis=3
+    )
+    product = pieces[0]
     for t in range(1, length):
-        product = product @ pieces[:, t]
-        product /= product.max(axis=(1, 2), keepdims=True)
-    row = np.array([0.5, 0.5])
-    begins = np.empty((n_pieces, 2))
-    for i in range(n_pieces):
-        begins[i] = row
-        row = row @ product[i]
-        row /= row.sum()
-    rows = np.empty((n_pieces, length, 2))
-    current = begins
+        product = product[:, 0, None] * pieces[t, 0] + product[:, 1, None] * pieces[t, 1]
+        product /= product.reshape(4, -1).max(axis=0)
+    ends = np.cumsum(numbers)
+    begins = np.concatenate([_begins(part) for part in np.split(product, ends[:-1], axis=2)], axis=1)
+    rows, current = np.empty((length, *begins.shape)), begins
     for t in range(length):
-        current = np.einsum("ij,ijk->ik", current, pieces[:, t])
-        current /= current.sum(axis=1, keepdims=True)
-        rows[:, t] = current
-    return rows.reshape(-1, 2)[:N]
+        current = np.add(current[0] * pieces[t, 0], current[1] * pieces[t, 1], out=rows[t])
+        current /= current[0] + current[1]
+    return [
+        part.transpose(2, 0, 1).reshape(-1, 2)[: len(sequence)]
+        for part, sequence in zip(np.split(rows, ends[:-1], axis=2), sequences, strict=True)
+    ]
+
+
+def _cut(sequence: Floats, length: int, number: int) -> Floats:
+    """Cut matrices (N, 2, 2) into pieces, (length, 2, 2, number), the last of which ends with identities."""
+    padded = np.empty((number * length, 2, 2))
+    padded[: len(sequence)], padded[len(sequence) :] = sequence, np.eye(2)
+    return np.ascontiguousarray(padded.reshape(number, length, 2, 2).transpose(1, 2, 3, 0))
+
+
+def _begins(products: Floats) -> Floats:
+    """Compute the rows (2, K) that pieces begin with, given the product of each, (2, 2, K)."""
+    a = b = 0.5
+    begins = []
+    for (aa, ab), (ba, bb) in products.transpose(2, 0, 1).tolist():
+        begins.append((a, b))
+        first, second = a * aa + b * ba, a * ab + b * bb
+        a, b = first / (first + second), second / (first + second)
+    return np.array(begins).reshape(-1, 2).T

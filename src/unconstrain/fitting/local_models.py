@@ -98,8 +98,7 @@ class LocalModels:
         for start in range(0, len(X), BLOCK_ROWS):
             block = X[start : start + BLOCK_ROWS]
             blend = normalized_activations(block, self.centers, self.width)
-            local = self._evaluate_each(block, w)
-            actions[start : start + BLOCK_ROWS] = np.einsum("nm,nmd->nd", blend, local)
+            actions[start : start + BLOCK_ROWS] = self._evaluate_blend(block, blend, w)
         return actions
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
@@ -157,6 +156,14 @@ class LocalModels:
             Slopes and offsets; None for features other than (x, 1).
         """
         return self.features.linear(w) if isinstance(self.features, LinearInState) else None
+
+    def _evaluate_blend(self, X: np.ndarray, blend: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Evaluate the models blended (N, M), (N, d)."""
+        if not isinstance(self.features, FullBasis):
+            return np.einsum("nm,nmd->nd", blend, self._evaluate_each(X, w))
+        # Blending parameters takes one product, and leaves fewer numbers than blending what they predict.
+        blended = (w.T @ blend.T).reshape(self.n_actions, -1, len(X))
+        return np.einsum("dbn,bn->dn", blended, self.features.basis(X).T).T
 
     def _evaluate_each(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate every model, (N, M, d)."""

@@ -92,7 +92,7 @@ class Tridiagonal:
         solved, is_clear = _solve(self.diagonal, self.beside, decays, turned)
         for m in np.flatnonzero(~is_clear.all(axis=1)):
             rows = ~is_clear[m]
-            own = turned[m] if turned.shape[2] == 1 else turned[m][:, rows]
+            own = turned[m] if pulls.shape[2] == 1 else turned[m][:, rows]
             solved[m][:, rows] = self._solve_by_eigenvectors(int(m), decays[rows], own)
         columns = solved.transpose(1, 0, 2, 3).reshape(P, S, -1).transpose(1, 0, 2)
         return self._multiply("N", columns).reshape(S, P, len(decays), K)

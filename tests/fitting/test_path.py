@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 
 import unconstrain as uc
 from unconstrain.fitting import path
-from unconstrain.fitting.banded import Banded
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.path import Path
-from unconstrain.fitting.tridiagonal import Tridiagonal
 
 
 def random_moments(rng, batch, P, K, n_samples):
@@ -42,17 +40,18 @@ def test_reduced_solves_as_eigenvectors_do(seed, P, K, is_wide, has_targets):
     np.testing.assert_allclose(reduced.solve(alphas, toward), expected, rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.parametrize("P", [5, 130])
-def test_eigenvalues_that_rounding_leaves_below_zero_count_as_zero(P):
+@pytest.mark.parametrize("is_wide", [False, True])
+def test_directions_that_no_sample_shows_are_left_out_as_by_eigenvectors(is_wide, monkeypatch):
+    monkeypatch.setattr(path, "WIDE", 0 if is_wide else 1000)
     rng = np.random.default_rng(0)
-    values = np.append(-1e-3, np.linspace(1.0, 2.0, P - 1))
-    Q = np.linalg.qr(rng.standard_normal((P, P)))[0]
-    H, y, decays = (Q * values) @ Q.T, rng.standard_normal((P, 1, 1)), np.array([1e-4, 1.0])
-    lifted = Q @ ((Q.T @ y[:, 0]) / (np.maximum(values, 0.0)[:, None] + decays))
+    few, many = random_moments(rng, (), 9, 1, 6), random_moments(rng, (), 9, 1, 20)
+    both = Moments(np.stack([few.H, many.H]), np.stack([few.g, many.g]), np.ones(2), np.ones(2))
+    alphas, toward = np.array([1e-16, 1.0]), rng.standard_normal((9, 2, 1))
+    reduced = Path.of(both)
+    assert reduced.is_determined.tolist() == [False, True]
     np.testing.assert_allclose(
-        Tridiagonal.of(H[None]).solve(decays, y[None])[0, :, 0, 0], lifted[:, 0], rtol=1e-9
+        reduced.solve(alphas, toward), both.decompose().solve(alphas, toward), rtol=1e-9
     )
-    np.testing.assert_allclose(Banded.of(H, 8).solve(decays, y)[:, 0, 0], lifted[:, 0], rtol=1e-9)
 
 
 class _BySpectrum:
@@ -87,6 +86,4 @@ def test_the_same_lambda_is_chosen_as_by_eigenvectors(risk, is_wide, monkeypatch
     for policy, (alpha, held_out) in zip(policies, chosen, strict=True):
         policy.fit(X, U, groups=groups)
         assert policy.alpha_ == alpha
-        # Below 1e-10 of the mean eigenvalue, eigenvectors left out what is rounding.
-        np.testing.assert_allclose(held_out, policy.held_out_risk_, rtol=1e-4)
-        np.testing.assert_allclose(held_out[4:], policy.held_out_risk_[4:], rtol=1e-6)
+        np.testing.assert_allclose(held_out, policy.held_out_risk_, rtol=1e-6)

@@ -18,8 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unconstrain.fitting.tridiagonal import ROUNDING, solve_by_eigenvectors
-
 BAND = 96
 """Diagonals beside the main one: with fewer, products are narrow; with more, each λ costs more."""
 
@@ -66,13 +64,25 @@ class Banded:
             reflectors.append((V, T))
         return cls(_gather_bands(columns, P, band), reflectors)
 
+    @property
+    def is_determined(self) -> bool:
+        """Whether no eigenvalue is rounding, as `Spectrum.determined` says: then B less such a one has a factor."""
+        from scipy.linalg.lapack import dpbtrf
+
+        lengths = (
+            np.sum(self.bands**2, axis=0) ** 0.5
+        )  # of no column of a matrix is more than its largest eigenvalue
+        lowered = self.bands.copy()
+        lowered[0] -= len(lengths) * np.finfo(np.float64).eps * lengths.max()
+        return bool(dpbtrf(lowered, lower=1, overwrite_ab=1)[1] == 0)
+
     def solve(self, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
-        """Solve `(H + λI) w = y` for several λ.
+        """Solve `(H + λI) w = y` for several λ, where no eigenvalue is rounding.
 
         Parameters
         ----------
         decays : ndarray of shape (L,)
-            λ, all above zero.
+            λ, none below zero.
         pulls : ndarray of shape (P, L or 1, K)
             y, for each λ or the same for all.
 
@@ -81,14 +91,15 @@ class Banded:
         ndarray of shape (P, L, K)
             w.
         """
+        from scipy.linalg.lapack import dpbsv
+
         P, L, K = len(pulls), len(decays), pulls.shape[2]
-        turned = self._turn(pulls.reshape(P, -1)).reshape(pulls.shape)
-        turned = np.broadcast_to(turned, (P, L, K))
+        turned = np.broadcast_to(self._turn(pulls.reshape(P, -1)).reshape(pulls.shape), (P, L, K))
         solved = np.empty((P, L, K))
-        is_clear = [self._solve_one(decays[i], turned[:, i], solved[:, i]) for i in range(L)]
-        if not all(is_clear):
-            rows = ~np.array(is_clear)
-            solved[:, rows] = self._solve_by_eigenvectors(decays[rows], turned[:, rows])
+        for i, decay in enumerate(decays):
+            lifted = self.bands.copy()
+            lifted[0] += decay
+            solved[:, i] = dpbsv(lifted, turned[:, i], lower=1, overwrite_ab=1)[1]
         return self._turn_back(solved.reshape(P, -1)).reshape(solved.shape)
 
     def _turn(self, columns: np.ndarray) -> np.ndarray:
@@ -104,22 +115,6 @@ class Banded:
         for V, T in reversed(self.reflectors):
             product[-len(V) :] -= V @ (T @ (V.T @ product[-len(V) :]))
         return product
-
-    def _solve_one(self, decay: float, pull: np.ndarray, out: np.ndarray) -> bool:
-        """Solve `(B + λI) x = y` for one λ; returns whether all pivots are clear of rounding."""
-        from scipy.linalg.lapack import dpbsv
-
-        lifted = self.bands.copy()
-        lifted[0] += decay
-        factor, out[:], failed = dpbsv(lifted, pull, lower=1, overwrite_ab=1)
-        return failed == 0 and bool(factor[0].min() ** 2 > ROUNDING * np.abs(self.bands[0]).max())
-
-    def _solve_by_eigenvectors(self, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
-        """Solve where rounding has left eigenvalues below zero, which are taken for zero."""
-        from scipy.linalg import eig_banded
-
-        values, vectors = eig_banded(self.bands, lower=True)
-        return solve_by_eigenvectors(values, vectors, decays, pulls)
 
 
 def _reflect(panel: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

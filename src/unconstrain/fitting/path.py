@@ -3,17 +3,17 @@
 With eigenvectors of H any λ is one product (`Spectrum`). But all that is needed is an orthogonal basis in which H + λI
 is easily solved, and one in which H has few diagonals costs a quarter of eigenvectors (`tridiagonal`, `banded`).
 
-Directions that no sample shows, but for rounding, are not told apart from others here: they decay to t as any other,
-and what rounding leaves of g is divided by λ. λ is chosen among values of at least 1e-11 of the mean eigenvalue, where
-that is a hundred thousandth of the policy.
+That is so where all directions are determined. Where some are not, but for rounding, H + λI for a small λ is solved
+only with them left out, which takes eigenvectors.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from unconstrain.fitting.banded import Banded
-from unconstrain.fitting.moments import Moments
+from unconstrain.fitting.moments import Moments, Spectrum
 from unconstrain.fitting.tridiagonal import Tridiagonal
 
 WIDE = 1200
@@ -29,11 +29,17 @@ class Path:
     g : ndarray of shape (..., P, K)
         Of the moments.
     reduced : Tridiagonal or list of Banded
-        H of all models.
+        H of the models all of whose directions are determined.
+    spectrum : Spectrum, optional
+        Of the others.
+    is_determined : ndarray of shape (S,), bool
+        Which models are which.
     """
 
     g: np.ndarray
     reduced: Tridiagonal | list[Banded]
+    spectrum: Spectrum | None
+    is_determined: np.ndarray
 
     @classmethod
     def of(cls, moments: Moments) -> "Path":
@@ -51,7 +57,22 @@ class Path:
         """
         P = moments.H.shape[-1]
         stack = moments.H.reshape(-1, P, P)
-        return cls(moments.g, Tridiagonal.of(stack) if 1 < P < WIDE else [Banded.of(one) for one in stack])
+        reduced: Any
+        if 1 < P < WIDE:
+            reduced = Tridiagonal.of(stack)
+            is_determined = reduced.is_determined
+            reduced = reduced.select(is_determined)
+        else:
+            each = [Banded.of(one) for one in stack]
+            is_determined = np.array([one.is_determined for one in each])
+            reduced = [one for one, is_it in zip(each, is_determined, strict=True) if is_it]
+        spectrum = None
+        if not is_determined.all():
+            others = moments.g.reshape(-1, *moments.g.shape[-2:])[~is_determined]
+            spectrum = Moments(
+                stack[~is_determined], others, np.zeros(len(others)), np.zeros(len(others))
+            ).decompose()
+        return cls(moments.g, reduced, spectrum, is_determined)
 
     def solve(self, decays: np.ndarray, toward: np.ndarray | None = None) -> np.ndarray:
         """Solve for `w = t + (H + λI)⁻¹ (g - Ht)` for several λ.
@@ -69,13 +90,18 @@ class Path:
             Parameters for each λ.
         """
         *batch, P, K = self.g.shape
-        pulls = self.g.reshape(-1, P, 1, K)
-        if toward is not None:
-            pulls = pulls + decays[:, None] * toward
-        if isinstance(self.reduced, Tridiagonal):
-            solved = self.reduced.solve(decays, pulls)
-        else:
-            solved = np.stack(
-                [one.solve(decays, pull) for one, pull in zip(self.reduced, pulls, strict=True)]
-            )
+        solved = np.empty((len(self.is_determined), P, len(decays), K))
+        if self.is_determined.any():
+            pulls = self.g.reshape(-1, P, 1, K)[self.is_determined]
+            if toward is not None:
+                pulls = pulls + decays[:, None] * toward
+            if isinstance(self.reduced, Tridiagonal):
+                solved[self.is_determined] = self.reduced.solve(decays, pulls)
+            else:
+                for place, one, pull in zip(
+                    np.flatnonzero(self.is_determined), self.reduced, pulls, strict=True
+                ):
+                    solved[place] = one.solve(decays, pull)
+        if self.spectrum is not None:
+            solved[~self.is_determined] = self.spectrum.solve(decays, toward)
         return solved.reshape(*batch, P, len(decays), K)

@@ -12,9 +12,6 @@ import numpy as np
 
 from unconstrain.parallel import map_shares
 
-ROUNDING = 10 * np.finfo(np.float64).eps
-"""Pivots below that share of the largest entry say no more than rounding does."""
-
 SMALL = 128
 """Parameters up to which Q is formed: batches of products are then faster than LAPACK's reflections, model by model."""
 
@@ -72,13 +69,52 @@ class Tridiagonal:
                 basis[m] = np.asfortranarray(held[1:, :-1])
         return cls(basis, factors, diagonal, beside)
 
+    @property
+    def is_determined(self) -> np.ndarray:
+        """Whether no eigenvalue (S,) is rounding: `Spectrum.determined` of all eigenvectors.
+
+        So `T - f I` is positive definite for the largest such eigenvalue f, which its pivots tell.
+        """
+        beside = np.abs(self.beside)
+        rows = np.abs(self.diagonal)
+        rows[:, 1:] += beside
+        rows[:, :-1] += beside
+        floor = rows.shape[1] * np.finfo(np.float64).eps * rows.max(axis=1)
+        lowered, squares = (self.diagonal - floor[:, None]).T, self.beside.T**2
+        pivot, is_positive = lowered[0], lowered[0] > 0
+        for i in range(1, len(lowered)):
+            # Once a pivot is not above zero, those after it do not matter.
+            pivot = lowered[i] - squares[i - 1] / np.where(is_positive, pivot, 1.0)
+            is_positive = is_positive & (pivot > 0)
+        return np.asarray(is_positive)
+
+    def select(self, rows: np.ndarray) -> "Tridiagonal":
+        """Select some of the matrices.
+
+        Parameters
+        ----------
+        rows : ndarray of shape (S,), bool
+            Which.
+
+        Returns
+        -------
+        Tridiagonal
+            Of those.
+        """
+        if rows.all():
+            return self
+        basis: Any = self.basis[rows] if isinstance(self.basis, np.ndarray) else None
+        if basis is None:
+            basis = [self.basis[m] for m in np.flatnonzero(rows)]
+        return Tridiagonal(basis, self.factors[rows], self.diagonal[rows], self.beside[rows])
+
     def solve(self, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
-        """Solve `(H + λI) w = y` for several λ.
+        """Solve `(H + λI) w = y` for several λ, where no eigenvalue is rounding.
 
         Parameters
         ----------
         decays : ndarray of shape (L,)
-            λ, all above zero.
+            λ, none below zero.
         pulls : ndarray of shape (S, P, L or 1, K)
             y, for each λ or the same for all.
 
@@ -89,12 +125,7 @@ class Tridiagonal:
         """
         S, P, K = len(pulls), pulls.shape[1], pulls.shape[-1]
         turned = self._multiply("T", pulls.reshape(S, P, -1)).reshape(pulls.shape)
-        solved, is_clear = _solve(self.diagonal, self.beside, decays, turned)
-        for m in np.flatnonzero(~is_clear.all(axis=1)):
-            rows = ~is_clear[m]
-            own = turned[m] if pulls.shape[2] == 1 else turned[m][:, rows]
-            solved[m][:, rows] = self._solve_by_eigenvectors(int(m), decays[rows], own)
-        columns = solved.transpose(1, 0, 2, 3).reshape(P, S, -1).transpose(1, 0, 2)
+        columns = _solve(self.diagonal, self.beside, decays, turned).reshape(P, S, -1).transpose(1, 0, 2)
         return self._multiply("N", columns).reshape(S, P, len(decays), K)
 
     def _multiply(self, form: str, columns: np.ndarray) -> np.ndarray:
@@ -115,58 +146,19 @@ class Tridiagonal:
         map_shares(share, range(len(columns)))
         return product
 
-    def _solve_by_eigenvectors(self, m: int, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
-        """Solve where rounding has left eigenvalues below zero, which are taken for zero."""
-        from scipy.linalg import eigh_tridiagonal
 
-        values, vectors = eigh_tridiagonal(self.diagonal[m], self.beside[m])
-        return solve_by_eigenvectors(values, vectors, decays, pulls)
-
-
-def solve_by_eigenvectors(
-    values: np.ndarray, vectors: np.ndarray, decays: np.ndarray, pulls: np.ndarray
-) -> np.ndarray:
-    """Solve `(H + λI) w = y` with eigenvalues below zero taken for zero.
-
-    Parameters
-    ----------
-    values : ndarray of shape (P,)
-        Eigenvalues of H.
-    vectors : ndarray of shape (P, P)
-        Eigenvectors of H.
-    decays : ndarray of shape (L,)
-        λ, all above zero.
-    pulls : ndarray of shape (P, L or 1, K)
-        y.
-
-    Returns
-    -------
-    ndarray of shape (P, L, K)
-        w.
-    """
-    along = np.tensordot(vectors.T, pulls, 1) / (np.maximum(values, 0.0)[:, None] + decays)[:, :, None]
-    return np.tensordot(vectors, along, 1)
-
-
-def _solve(
-    diagonal: np.ndarray, beside: np.ndarray, decays: np.ndarray, pulls: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Solve by `LDLᵀ`; returns solutions (S, P, L, K), and where (S, L) all pivots are clear of rounding."""
+def _solve(diagonal: np.ndarray, beside: np.ndarray, decays: np.ndarray, pulls: np.ndarray) -> np.ndarray:
+    """Solve `(T + λI) x = y` by `LDLᵀ`, (P, S, L, K)."""
     S, P, _, K = pulls.shape
     y = pulls.transpose(1, 0, 2, 3)
-    a, e = diagonal.T[:, :, None] + decays, beside.T[:, :, None]
-    pivots, ratios, x = a, np.empty((P - 1, S, len(decays))), np.empty((P, S, len(decays), K))
+    pivots, e = diagonal.T[:, :, None] + decays, beside.T[:, :, None]
+    ratios, x = np.empty((P - 1, S, len(decays))), np.empty((P, S, len(decays), K))
     x[0] = y[0]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for i in range(1, P):
-            np.divide(e[i - 1], pivots[i - 1], out=ratios[i - 1])
-            pivots[i] -= ratios[i - 1] * e[i - 1]
-            np.subtract(y[i], ratios[i - 1, :, :, None] * x[i - 1], out=x[i])
-        x /= pivots[..., None]
-        for i in range(P - 2, -1, -1):
-            x[i] -= ratios[i, :, :, None] * x[i + 1]
-    largest = np.abs(diagonal).max(axis=1)
-    is_clear = (pivots > ROUNDING * largest[:, None]).all(
-        axis=0
-    )  # where a pivot is no number, it is not above
-    return x.transpose(1, 0, 2, 3), is_clear
+    for i in range(1, P):
+        np.divide(e[i - 1], pivots[i - 1], out=ratios[i - 1])
+        pivots[i] -= ratios[i - 1] * e[i - 1]
+        np.subtract(y[i], ratios[i - 1, :, :, None] * x[i - 1], out=x[i])
+    x /= pivots[..., None]
+    for i in range(P - 2, -1, -1):
+        x[i] -= ratios[i, :, :, None] * x[i + 1]
+    return x

@@ -132,18 +132,18 @@ def _update(columns: list[np.ndarray], V: np.ndarray, T: np.ndarray, band: int) 
     """Turn what is left of the matrix, in place."""
     from scipy.linalg.blas import dgemm
 
+    # BLAS adds in place to a matrix that is stored a column after the other, which the transpose of each is here.
     VT, W = V @ T, np.zeros_like(V)
     for place, block in enumerate(columns):
-        begin, width = place * band, block.shape[1]
-        W[begin:] += block @ VT[begin : begin + width]
-        if len(block) > width:
-            W[begin : begin + width] += block[width:].T @ VT[begin + width :]
+        begin, end = place * band, place * band + block.shape[1]
+        dgemm(1.0, VT[begin:end].T, block.T, 1.0, W[begin:].T, overwrite_c=1)
+        if len(block) > end - begin:
+            dgemm(1.0, VT[end:].T, block[end - begin :].T, 1.0, W[begin:end].T, trans_b=1, overwrite_c=1)
     X = W - 0.5 * V @ (T.T @ (V.T @ W))
     left, right = np.hstack([V, X]), np.hstack([X, V])
     for place, block in enumerate(columns):
-        begin, width = place * band, block.shape[1]
-        # BLAS writes to a matrix that is stored a column after the other, which the transpose is.
-        dgemm(-1.0, right[begin : begin + width].T, left[begin:].T, 1.0, block.T, trans_a=1, overwrite_c=1)
+        begin, end = place * band, place * band + block.shape[1]
+        dgemm(-1.0, right[begin:end].T, left[begin:].T, 1.0, block.T, trans_a=1, overwrite_c=1)
 
 
 def _gather_bands(columns: list[np.ndarray], P: int, band: int) -> np.ndarray:

@@ -24,7 +24,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, models, start, step, stream, viewer
+from benchmarks import fits, identifiability, models, passes, start, step, stream, viewer
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -35,7 +35,9 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "parametric-fit": fits.parametric_fit,
     "wide-fit": fits.wide_fit,
     "lambda-path": fits.lambda_path,
+    "lambda-path-wide": fits.lambda_path_wide,
     "lambda-path-local": fits.lambda_path_local,
+    **passes.BENCHMARKS,
     "loop": fits.loop,
     "growth": fits.growth,
     "report": identifiability.report,

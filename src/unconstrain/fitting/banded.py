@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BAND = 96
+BAND = 128
 """Diagonals beside the main one: with fewer, products are narrow; with more, each λ costs more."""
 
 

@@ -10,7 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from unconstrain.parallel import map_shares
+from unconstrain.fitting.unlocked import sytrd
+from unconstrain.parallel import cut_blocks, map_shares
+
+MODELS_IN_PIECE = 8
 
 SMALL = 128
 """Parameters up to which Q is formed: batches of products are then faster than LAPACK's reflections, model by model."""
@@ -51,22 +54,25 @@ class Tridiagonal:
         Tridiagonal
             Of them.
         """
-        from scipy.linalg.lapack import dorgqr, dsytrd, dsytrd_lwork
+        from scipy.linalg.lapack import dorgqr
 
         S, P = H.shape[:2]
-        lwork = int(dsytrd_lwork(P, lower=1)[0])
         diagonal, beside, factors = np.empty((S, P)), np.empty((S, P - 1)), np.empty((S, P - 1))
         basis: Any = [None] * S
         if P <= SMALL:
             basis = np.zeros((S, P, P))
             basis[:, 0, 0] = 1.0
-        # SciPy keeps the interpreter here, so threads would wait for each other; BLAS may use its own.
-        for m in range(S):
-            held, diagonal[m], beside[m], factors[m], _ = dsytrd(H[m].T, lower=1, lwork=lwork)
-            if P <= SMALL:
-                basis[m, 1:, 1:] = dorgqr(held[1:, :-1], factors[m], overwrite_a=1)[0]
-            else:
-                basis[m] = np.asfortranarray(held[1:, :-1])
+
+        def share(pieces: Sequence[slice]) -> None:
+            for piece in pieces:
+                for m in range(piece.start, piece.stop):
+                    held, diagonal[m], beside[m], factors[m] = sytrd(H[m])
+                    if P <= SMALL:
+                        basis[m, 1:, 1:] = dorgqr(held[1:, :-1], factors[m], overwrite_a=1)[0]
+                    else:
+                        basis[m] = np.asfortranarray(held[1:, :-1])
+
+        map_shares(share, cut_blocks(S, MODELS_IN_PIECE))
         return cls(basis, factors, diagonal, beside)
 
     @property

@@ -1,7 +1,7 @@
 """What a pass of the adaptive risk costs, beside one of the inconsistency.
 
-With λ by cross-validation every fifth pass also sums what λ is chosen by. The rows are the mean of five passes, with what
-each of the two kinds takes beside it.
+With λ by cross-validation every fifth pass also sums what λ is chosen by. The rows are the mean of five passes; what
+each of the two kinds takes is beside it.
 """
 
 from collections.abc import Callable

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import unconstrain as uc
-from unconstrain.fitting import path
+from unconstrain.fitting import path, unlocked
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.path import Path
+from unconstrain.fitting.tridiagonal import Tridiagonal
 
 
 def random_moments(rng, batch, P, K, n_samples):
@@ -35,6 +36,7 @@ def test_reduced_solves_as_eigenvectors_do(seed, P, K, is_wide, has_targets):
     toward = rng.standard_normal((P, 4, K)) if has_targets else None
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(path, "WIDE", 0 if is_wide else 1000)
+        patch.setattr(path, "FEW", 0)
         reduced = Path.of(moments)
     expected = moments.decompose().solve(alphas, toward)
     np.testing.assert_allclose(reduced.solve(alphas, toward), expected, rtol=1e-10, atol=1e-10)
@@ -43,15 +45,28 @@ def test_reduced_solves_as_eigenvectors_do(seed, P, K, is_wide, has_targets):
 @pytest.mark.parametrize("is_wide", [False, True])
 def test_directions_that_no_sample_shows_are_left_out_as_by_eigenvectors(is_wide, monkeypatch):
     monkeypatch.setattr(path, "WIDE", 0 if is_wide else 1000)
+    monkeypatch.setattr(path, "FEW", 0)
     rng = np.random.default_rng(0)
     few, many = random_moments(rng, (), 9, 1, 6), random_moments(rng, (), 9, 1, 20)
     both = Moments(np.stack([few.H, many.H]), np.stack([few.g, many.g]), np.ones(2), np.ones(2))
     alphas, toward = np.array([1e-16, 1.0]), rng.standard_normal((9, 2, 1))
     reduced = Path.of(both)
-    assert reduced.is_determined.tolist() == [False, True]
+    assert reduced.is_reduced.tolist() == [False, True]
     np.testing.assert_allclose(
         reduced.solve(alphas, toward), both.decompose().solve(alphas, toward), rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("P", [2, 30, 140])
+def test_without_the_lock_it_is_the_same_routine(P, monkeypatch):
+    moments = random_moments(np.random.default_rng(0), (3,), P, 1, 2 * P)
+    found = Tridiagonal.of(moments.H)
+    monkeypatch.setattr(unlocked, "_routine", lambda: None)
+    plain = Tridiagonal.of(moments.H)
+    np.testing.assert_array_equal(found.diagonal, plain.diagonal)
+    np.testing.assert_array_equal(found.factors, plain.factors)
+    for one, other in zip(found.basis, plain.basis, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 class _BySpectrum:
@@ -80,6 +95,7 @@ def test_the_same_lambda_is_chosen_as_by_eigenvectors(risk, is_wide, monkeypatch
         uc.LocallyLinearPolicy(n_centers=6, risk=risk, random_state=0),
     )
     monkeypatch.setattr(path, "WIDE", 0 if is_wide else 1000)
+    monkeypatch.setattr(path, "FEW", 0)
     found = [policy.fit(X, U, groups=groups) for policy in policies]
     chosen = [(policy.alpha_, policy.held_out_risk_) for policy in found]
     monkeypatch.setattr("unconstrain.fitting.decay.Path", _BySpectrum)

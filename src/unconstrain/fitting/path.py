@@ -14,10 +14,13 @@ import numpy as np
 
 from unconstrain.fitting.banded import Banded
 from unconstrain.fitting.moments import Moments, Spectrum
-from unconstrain.fitting.tridiagonal import Tridiagonal
+from unconstrain.fitting.tridiagonal import SMALL, Tridiagonal
 
 WIDE = 1200
 """Parameters from which on a matrix does not fit into the processor's cache."""
+
+FEW = 4
+"""Small matrices up to which their eigenvectors are there before the recursion over P rows, in Python, is done."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +32,17 @@ class Path:
     g : ndarray of shape (..., P, K)
         Of the moments.
     reduced : Tridiagonal or list of Banded
-        H of the models all of whose directions are determined.
+        H of models all of whose directions are determined.
     spectrum : Spectrum, optional
-        Of the others.
-    is_determined : ndarray of shape (S,), bool
-        Which models are which.
+        Of the others, and where models are few and small.
+    is_reduced : ndarray of shape (S,), bool
+        Which models are reduced.
     """
 
     g: np.ndarray
     reduced: Tridiagonal | list[Banded]
     spectrum: Spectrum | None
-    is_determined: np.ndarray
+    is_reduced: np.ndarray
 
     @classmethod
     def of(cls, moments: Moments) -> "Path":
@@ -57,22 +60,24 @@ class Path:
         """
         P = moments.H.shape[-1]
         stack = moments.H.reshape(-1, P, P)
-        reduced: Any
-        if 1 < P < WIDE:
+        reduced: Any = []
+        if P == 1 or (P <= SMALL and len(stack) <= FEW):
+            is_reduced = np.zeros(len(stack), dtype=bool)
+        elif P < WIDE:
             reduced = Tridiagonal.of(stack)
-            is_determined = reduced.is_determined
-            reduced = reduced.select(is_determined)
+            is_reduced = reduced.is_determined
+            reduced = reduced.select(is_reduced)
         else:
             each = [Banded.of(one) for one in stack]
-            is_determined = np.array([one.is_determined for one in each])
-            reduced = [one for one, is_it in zip(each, is_determined, strict=True) if is_it]
+            is_reduced = np.array([one.is_determined for one in each])
+            reduced = [one for one, is_it in zip(each, is_reduced, strict=True) if is_it]
         spectrum = None
-        if not is_determined.all():
-            others = moments.g.reshape(-1, *moments.g.shape[-2:])[~is_determined]
+        if not is_reduced.all():
+            others = moments.g.reshape(-1, *moments.g.shape[-2:])[~is_reduced]
             spectrum = Moments(
-                stack[~is_determined], others, np.zeros(len(others)), np.zeros(len(others))
+                stack[~is_reduced], others, np.zeros(len(others)), np.zeros(len(others))
             ).decompose()
-        return cls(moments.g, reduced, spectrum, is_determined)
+        return cls(moments.g, reduced, spectrum, is_reduced)
 
     def solve(self, decays: np.ndarray, toward: np.ndarray | None = None) -> np.ndarray:
         """Solve for `w = t + (H + λI)⁻¹ (g - Ht)` for several λ.
@@ -90,18 +95,18 @@ class Path:
             Parameters for each λ.
         """
         *batch, P, K = self.g.shape
-        solved = np.empty((len(self.is_determined), P, len(decays), K))
-        if self.is_determined.any():
-            pulls = self.g.reshape(-1, P, 1, K)[self.is_determined]
+        solved = np.empty((len(self.is_reduced), P, len(decays), K))
+        if self.is_reduced.any():
+            pulls = self.g.reshape(-1, P, 1, K)[self.is_reduced]
             if toward is not None:
                 pulls = pulls + decays[:, None] * toward
             if isinstance(self.reduced, Tridiagonal):
-                solved[self.is_determined] = self.reduced.solve(decays, pulls)
+                solved[self.is_reduced] = self.reduced.solve(decays, pulls)
             else:
                 for place, one, pull in zip(
-                    np.flatnonzero(self.is_determined), self.reduced, pulls, strict=True
+                    np.flatnonzero(self.is_reduced), self.reduced, pulls, strict=True
                 ):
                     solved[place] = one.solve(decays, pull)
         if self.spectrum is not None:
-            solved[~self.is_determined] = self.spectrum.solve(decays, toward)
+            solved[~self.is_reduced] = self.spectrum.solve(decays, toward)
         return solved.reshape(*batch, P, len(decays), K)

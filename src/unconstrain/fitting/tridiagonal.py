@@ -63,16 +63,23 @@ class Tridiagonal:
             basis = np.zeros((S, P, P))
             basis[:, 0, 0] = 1.0
 
+        stack = np.array(H, order="C")
+
         def share(pieces: Sequence[slice]) -> None:
             for piece in pieces:
+                sytrd(stack[piece], diagonal[piece], beside[piece], factors[piece])
                 for m in range(piece.start, piece.stop):
-                    held, diagonal[m], beside[m], factors[m] = sytrd(H[m])
+                    reflectors = stack[m].T[1:, :-1]
                     if P <= SMALL:
-                        basis[m, 1:, 1:] = dorgqr(held[1:, :-1], factors[m], overwrite_a=1)[0]
+                        basis[m, 1:, 1:] = dorgqr(reflectors, factors[m])[0]
                     else:
-                        basis[m] = np.asfortranarray(held[1:, :-1])
+                        basis[m] = np.asfortranarray(reflectors)
 
-        map_shares(share, cut_blocks(S, MODELS_IN_PIECE))
+        pieces = cut_blocks(S, MODELS_IN_PIECE)
+        if P <= SMALL:  # done before threads have begun
+            share(pieces)
+        else:
+            map_shares(share, pieces)
         return cls(basis, factors, diagonal, beside)
 
     @property
@@ -86,13 +93,11 @@ class Tridiagonal:
         rows[:, 1:] += beside
         rows[:, :-1] += beside
         floor = rows.shape[1] * np.finfo(np.float64).eps * rows.max(axis=1)
-        lowered, squares = (self.diagonal - floor[:, None]).T, self.beside.T**2
-        pivot, is_positive = lowered[0], lowered[0] > 0
-        for i in range(1, len(lowered)):
-            # Once a pivot is not above zero, those after it do not matter.
-            pivot = lowered[i] - squares[i - 1] / np.where(is_positive, pivot, 1.0)
-            is_positive = is_positive & (pivot > 0)
-        return np.asarray(is_positive)
+        pivots, squares = (self.diagonal - floor[:, None]).T, self.beside.T**2
+        with np.errstate(divide="ignore", invalid="ignore"):  # beyond the first that is not above zero
+            for i in range(1, len(pivots)):
+                pivots[i] -= squares[i - 1] / pivots[i - 1]
+        return np.asarray((pivots > 0).all(axis=0))
 
     def select(self, rows: np.ndarray) -> "Tridiagonal":
         """Select some of the matrices.

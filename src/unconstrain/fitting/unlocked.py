@@ -11,45 +11,42 @@ from typing import Any
 
 import numpy as np
 
-Reduced = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
 N_INTEGERS, N_ARGUMENTS = 4, 10
 """Of the routine: n, lda, lwork and info, among ten. Where integers have another width they are not called `int`."""
 
 
-def sytrd(H: np.ndarray) -> Reduced:
-    """Reduce a matrix to three diagonals.
+def sytrd(stack: np.ndarray, diagonal: np.ndarray, beside: np.ndarray, factors: np.ndarray) -> None:
+    """Reduce matrices to three diagonals, `dsytrd` of the lower triangle of each one's transpose.
 
     Parameters
     ----------
-    H : ndarray of shape (P, P)
-        Symmetric.
-
-    Returns
-    -------
-    held : ndarray of shape (P, P)
-        Reflectors, below the diagonal beside the main one.
-    diagonal : ndarray of shape (P,)
-        The main one.
-    beside : ndarray of shape (P - 1,)
-        The one beside it.
-    factors : ndarray of shape (P - 1,)
-        Of the reflectors.
+    stack : ndarray of shape (S, P, P)
+        Symmetric, stored a row after the other. Overwritten: of the transpose of each, what is below the diagonal
+        beside the main one are the reflectors.
+    diagonal : ndarray of shape (S, P)
+        Written to: the main one.
+    beside : ndarray of shape (S, P - 1)
+        Written to: the one beside it.
+    factors : ndarray of shape (S, P - 1)
+        Written to: of the reflectors.
     """
-    routine, P = _routine(), len(H)
+    routine, P = _routine(), stack.shape[1]
     lwork = _workspace(P)
     if routine is None:
         from scipy.linalg.lapack import dsytrd
 
-        held, diagonal, beside, factors, _ = dsytrd(H.T, lower=1, lwork=lwork)
-        return held, diagonal, beside, factors
-    held, work = np.array(H, dtype=np.float64, order="C"), np.empty(lwork)
-    diagonal, beside, factors = np.empty(P), np.empty(P - 1), np.empty(P - 1)
+        for m in range(len(stack)):
+            stack[m].T[:], diagonal[m], beside[m], factors[m], _ = dsytrd(stack[m].T, lower=1, lwork=lwork)
+        return
+    work = np.empty(lwork)
     n, size, info = ctypes.c_int(P), ctypes.c_int(lwork), ctypes.c_int(0)
-    matrix, *arrays = [each.ctypes.data for each in (held, diagonal, beside, factors, work)]
-    order, integers = ctypes.byref(n), (ctypes.byref(size), ctypes.byref(info))
-    routine(ctypes.c_char_p(b"L"), order, matrix, order, *arrays, *integers)
-    return held.T, diagonal, beside, factors
+    order, last = ctypes.byref(n), (work.ctypes.data, ctypes.byref(size), ctypes.byref(info))
+    triangle = ctypes.c_char_p(b"L")
+    written = (stack, diagonal, beside, factors)
+    begins, strides = [each.ctypes.data for each in written], [each.strides[0] for each in written]
+    for m in range(len(stack)):
+        matrix, *vectors = (begin + m * stride for begin, stride in zip(begins, strides, strict=True))
+        routine(triangle, order, matrix, order, *vectors, *last)
 
 
 @cache

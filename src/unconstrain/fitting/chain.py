@@ -128,37 +128,37 @@ def smooth(
     T = chain.transitions
     first = np.array([chain.free_share, 1 - chain.free_share])
     top = np.maximum(log_free, log_constrained)
-    relative = np.stack([log_free, log_constrained], axis=1) - top[:, None]
+    relative = np.stack([log_free, log_constrained]) - top
     # What is known stays certain, however strongly the neighbours speak against it.
     likelihood = np.where(np.isneginf(relative), 0.0, np.exp(np.maximum(relative, -MOST_TELLING)))
     omega = np.ones_like(top) if weights is None else weights
-    moves = np.broadcast_to(T, (len(top), 2, 2)).copy()
-    if log_kept is not None:
-        moves[:, CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))
-    steps = moves * likelihood[:, None, :]
-    # The first sample of an episode forgets what was before.
-    steps[starts] = (first * likelihood[starts])[:, None, :]
-    alone = starts.all()
-    if alone:
-        joint = first * likelihood
-        norm = joint.sum(axis=1)
-        free = joint[:, FREE] / norm
+    if starts.all():
+        joint = first[:, None] * likelihood
+        norm = joint.sum(axis=0)
+        free = joint[FREE] / norm
         states = np.array([omega @ free, omega @ (1 - free)])
         return free, top + np.log(norm), Counts(states, np.zeros((2, 2))), np.zeros_like(free)
+    # A row a pair of states: what follows is then one operation on all samples.
+    moves = np.repeat(T[:, :, None], len(top), axis=2)
+    if log_kept is not None:
+        moves[CONSTRAINED, CONSTRAINED] *= np.exp(np.clip(log_kept, -MOST_TELLING, MOST_TELLING / 2))
+    steps = moves * likelihood
+    # The first sample of an episode forgets what was before.
+    steps[:, :, starts] = (first[:, None] * likelihood[:, starts])[None]
     ahead, behind = _sweep_both_ways(steps)
     before = np.empty_like(ahead)
-    before[1:] = np.einsum("ni,nij->nj", ahead[:-1], moves[1:])
-    before[starts] = first
-    log_likelihood = top + np.log(np.einsum("nk,nk->n", before, likelihood))
+    before[:, 1:] = ahead[0, :-1] * moves[0, :, 1:] + ahead[1, :-1] * moves[1, :, 1:]
+    before[:, starts] = first[:, None]
+    log_likelihood = top + np.log(before[0] * likelihood[0] + before[1] * likelihood[1])
     both = ahead * behind
-    both /= both.sum(axis=1, keepdims=True)
-    inner = np.flatnonzero(~starts)
-    pairs = ahead[inner - 1][:, :, None] * moves[inner] * (likelihood * behind)[inner][:, None, :]
-    pairs /= pairs.sum(axis=(1, 2), keepdims=True)
+    both /= both[0] + both[1]
+    pairs = ahead[:, None, :-1] * moves[:, :, 1:] * (likelihood * behind)[:, 1:]
+    pairs = np.where(starts[1:], 0.0, pairs)
+    total = pairs.reshape(4, -1).sum(axis=0)
+    pairs /= np.where(starts[1:], 1.0, total)
     kept = np.zeros_like(top)
-    kept[inner] = pairs[:, CONSTRAINED, CONSTRAINED]
-    changes = np.einsum("n,nij->ij", omega[inner], pairs)
-    return both[:, FREE], log_likelihood, Counts(omega @ both, changes), kept
+    kept[1:] = pairs[CONSTRAINED, CONSTRAINED]
+    return both[FREE], log_likelihood, Counts(both @ omega, pairs @ omega[1:]), kept
 
 
 def _sweep_both_ways(steps: Floats) -> tuple[Floats, Floats]:
@@ -166,39 +166,39 @@ def _sweep_both_ways(steps: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    steps : ndarray of shape (N, 2, 2)
+    steps : ndarray of shape (2, 2, N)
         M.
 
     Returns
     -------
-    rows : ndarray of shape (N, 2)
+    rows : ndarray of shape (2, N)
         From (1/2, 1/2) before the first step.
-    columns : ndarray of shape (N, 2)
+    columns : ndarray of shape (2, N)
         Of which the last is (1/2, 1/2).
     """
-    N = len(steps)
+    N = steps.shape[2]
     compiled = loops.load_for(N, "chain")
-    backwards = steps[:0:-1].swapaxes(1, 2)
-    columns = np.empty((N, 2))
-    columns[-1] = 0.5
+    columns = np.empty((2, N))
+    columns[:, -1] = 0.5
     if compiled is not None:
-        rows, swept = np.empty((N, 2)), np.empty((N - 1, 2))
-        compiled.sweep(steps, rows)
-        compiled.sweep(backwards, swept)
-    else:
-        rows, swept = _sweep(steps, backwards)
-    columns[:-1] = swept[::-1]
-    return rows, columns
+        one_by_one, rows, swept = steps.transpose(2, 0, 1).copy(), np.empty((N, 2)), np.empty((N - 1, 2))
+        compiled.sweep(one_by_one, rows)
+        compiled.sweep(one_by_one[:0:-1].swapaxes(1, 2), swept)
+        columns[:, :-1] = swept[::-1].T
+        return rows.T, columns
+    ahead, back = _sweep(steps, steps[:, :, :0:-1].swapaxes(0, 1))
+    columns[:, :-1] = back[:, ::-1]
+    return ahead, columns
 
 
 def _sweep(*sequences: Floats) -> list[Floats]:
-    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for sequences of M (N, 2, 2).
+    """Compute the rows `r_t = r_{t-1} M_t`, each scaled to sum to one, for sequences of M (2, 2, N).
 
     Each sequence is cut into pieces of about √N, and all pieces advance side by side: first each one's product, then
     the row that each begins with, then the rows within.
     """
-    length = max(1, int(np.sqrt(len(sequences[0]))))
-    numbers = [-(-len(sequence) // length) for sequence in sequences]
+    length = max(1, int(np.sqrt(sequences[0].shape[2])))
+    numbers = [-(-sequence.shape[2] // length) for sequence in sequences]
     pieces = np.concatenate(
         [_cut(sequence, length, number) for sequence, number in zip(sequences, numbers, strict=True)], axis=3
     )
@@ -213,16 +213,17 @@ def _sweep(*sequences: Floats) -> list[Floats]:
         current = np.add(current[0] * pieces[t, 0], current[1] * pieces[t, 1], out=rows[t])
         current /= current[0] + current[1]
     return [
-        part.transpose(2, 0, 1).reshape(-1, 2)[: len(sequence)]
+        part.transpose(1, 2, 0).reshape(2, -1)[:, : sequence.shape[2]]
         for part, sequence in zip(np.split(rows, ends[:-1], axis=2), sequences, strict=True)
     ]
 
 
 def _cut(sequence: Floats, length: int, number: int) -> Floats:
-    """Cut matrices (N, 2, 2) into pieces, (length, 2, 2, number), the last of which ends with identities."""
-    padded = np.empty((number * length, 2, 2))
-    padded[: len(sequence)], padded[len(sequence) :] = sequence, np.eye(2)
-    return np.ascontiguousarray(padded.reshape(number, length, 2, 2).transpose(1, 2, 3, 0))
+    """Cut matrices (2, 2, N) into pieces, (length, 2, 2, number), the last of which ends with identities."""
+    N = sequence.shape[2]
+    padded = np.empty((2, 2, number * length))
+    padded[:, :, :N], padded[:, :, N:] = sequence, np.eye(2)[:, :, None]
+    return np.ascontiguousarray(padded.reshape(2, 2, number, length).transpose(3, 0, 1, 2))
 
 
 def _begins(products: Floats) -> Floats:

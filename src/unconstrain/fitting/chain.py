@@ -205,7 +205,7 @@ def _sweep(*sequences: Floats) -> list[Floats]:
     product = pieces[0]
     for t in range(1, length):
         product = product[:, 0, None] * pieces[t, 0] + product[:, 1, None] * pieces[t, 1]
-        product /= product.reshape(4, -1).max(axis=0)
+        product /= np.maximum.reduce(product.reshape(4, -1))
     ends = np.cumsum(numbers)
     begins = np.concatenate([_begins(part) for part in np.split(product, ends[:-1], axis=2)], axis=1)
     rows, current = np.empty((length, *begins.shape)), begins

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, simpson
 from scipy.special import gammaln
 
-from unconstrain.fitting.sphere import Sphere, blurred, limit, scaled_bessel
+from unconstrain.fitting.bessel import compute_scaled_bessel, scaled_bessel
+from unconstrain.fitting.sphere import Sphere, blurred, limit
 
 seeds = st.integers(0, 2**32 - 1)
 dimensions = st.integers(1, 400)
@@ -183,3 +184,14 @@ def test_where_nothing_moves_or_nothing_is_predicted_all_is_finite(d, s2):
         density = blurred(Sphere.of(U, P), np.array([s2]))
         for part in (density.log, density.by_policy, density.by_variance):
             assert np.isfinite(part).all()
+
+
+@pytest.mark.parametrize("d", [2, 3, 7, 27, 64])
+def test_interpolated_bessel_functions_are_as_exact(d):
+    kappa = np.geomspace(1e-6, 1e6, 40_000)
+    log_mean, short = scaled_bessel(d, kappa)
+    exact, exact_short = compute_scaled_bessel(d, kappa)
+    np.testing.assert_allclose(
+        log_mean, exact, rtol=1e-12, atol=1e-12
+    )  # logarithms of Γ are a thousand there
+    np.testing.assert_allclose(short, exact_short, rtol=3e-12)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unconstrain.fitting.sphere import scaled_bessel
+from unconstrain.fitting.bessel import scaled_bessel
 
 torch = pytest.importorskip("torch")
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.fitting.sphere import Sphere, scaled_bessel
+from unconstrain.fitting.bessel import scaled_bessel
+from unconstrain.fitting.sphere import Sphere
 
 Floats = NDArray[np.float64]
 

@@ -35,10 +35,16 @@ from unconstrain.scaling.stream import (
     source_for,
     to_learn_from,
 )
+from unconstrain.scaling.tree import plant
 
 __all__ = ["connected", "fit"]
 
 PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
+
+GROUPS_PER_THREAD = 2
+"""Where there are as many row groups, parts are whole ones: what lies before a part in its row group is decoded too."""
+
+LARGEST_GRAPH = "2 GiB"
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,10 @@ class Part:
     fold_of: dict[Any, int] | None
     n_before: int | None = None
 
+    def __dask_tokenize__(self) -> tuple[int, int]:
+        # Dask tells graphs apart by a digest of all they hold. Their keys do that already.
+        return self.start, self.stop
+
 
 @dataclass(frozen=True)
 class Added:
@@ -62,8 +72,21 @@ class Added:
     notes: tuple[Note, ...] = ()
     dealt: tuple[int, ...] = ()
 
+    def __sizeof__(self) -> int:
+        # Dask adds sums up where they are, if it knows how large they are.
+        return self.accumulator.total.nbytes
 
-Setup = tuple[Accumulator, Tables, int]
+
+@dataclass(frozen=True)
+class Setup:
+    """What all parts have in common: what they are added to, where they are read from, and how many rows at a time."""
+
+    empty: Accumulator
+    source: Tables
+    batch_rows: int
+
+    def __dask_tokenize__(self) -> int:
+        return self.batch_rows
 
 
 def fit(
@@ -123,7 +146,7 @@ def fit(
     check_episodes(policy, source, partial=partial)
     accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
-    rows = part_rows or max(batch_rows, -(-source.n_rows // (PARTS_PER_THREAD * threads)))
+    rows = part_rows or max(batch_rows, rows_of_part(source, threads))
     parts = list(divide(source, rows, accumulator.folds))
     with reporting(progress) as report:
 
@@ -160,6 +183,13 @@ def _inferred(
     assert inference.result is not None
     inference.result.folds = blank.folds
     return inference.result, notes
+
+
+def rows_of_part(source: Tables, threads: int) -> int:
+    """Decide how many rows a task should add up, at least, to keep so many threads busy."""
+    wanted = -(-source.n_rows // (PARTS_PER_THREAD * threads))
+    groups = source.row_groups
+    return wanted if len(groups) < GROUPS_PER_THREAD * threads else max(wanted, max(groups) // 2 + 1)
 
 
 def divide(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
@@ -252,20 +282,15 @@ def _episode_starts(source: Tables, rows: int) -> Iterator[int]:
 def _added_up(
     client: Any, empty: Accumulator, source: Tables, batch_rows: int, parts: list[Part], report: Report
 ) -> Added:
+    import dask
     import distributed
 
-    # A task, not scattered data: what a lost worker held of it can then be made again.
-    setup = client.submit(_setup, empty, source.in_one_thread(), batch_rows, pure=False)
-    level = [client.submit(_sum_of_part, setup, part, pure=False) for part in parts]
-    rows = {future.key: part.stop - part.start for future, part in zip(level, parts, strict=True)}
-    left = list(level)
-    while len(level) > 1:
-        pairs = [
-            client.submit(_sum_of_two, a, b, pure=False)
-            for a, b in zip(level[::2], level[1::2], strict=False)
-        ]
-        level = pairs + level[len(level) - len(level) % 2 :]
-    (total,) = level
+    setup = Setup(empty, source.in_one_thread(), batch_rows)
+    tree = plant((_same, setup), parts, _sum_of_part, _sum_of_two)
+    # Of many episodes the folds are megabytes, which Dask would warn of.
+    with dask.config.set({"distributed.admin.large-graph-warning-threshold": LARGEST_GRAPH}):
+        *left, total = client.get(tree.tasks, [*tree.parts, tree.total], sync=False)
+    rows = {future.key: part.stop - part.start for future, part in zip(left, parts, strict=True)}
     done = 0
     report(0, source.n_rows)
     try:
@@ -290,18 +315,17 @@ def _added_up(
             client.cancel([total, *left])
 
 
-def _setup(empty: Accumulator, source: Tables, batch_rows: int) -> Setup:
-    return empty, source, batch_rows
+def _same(setup: Setup) -> Setup:
+    return setup
 
 
 def _sum_of_part(setup: Setup, part: Part) -> Added:
-    empty, source, batch_rows = setup
-    accumulator = empty.empty(part.fold_of)
+    accumulator = setup.empty.empty(part.fold_of)
     if accumulator.folds is not None and part.n_before is not None:
         accumulator.folds.deal_unnamed(part.n_before)
     notes: tuple[Note, ...] = ()
     with threadpool_limits(1, user_api="blas"):
-        for block in source.blocks(batch_rows, part.start, part.stop):
+        for block in setup.source.blocks(setup.batch_rows, part.start, part.stop):
             loaded = block.load()
             samples = to_learn_from(accumulator, loaded)
             accumulator.include(accumulator.sums(samples, deal(accumulator, samples)))

@@ -228,9 +228,10 @@ class _Pass:
         kind = task.key[0].split("-")[0]
         if kind == "setup":
             return 0.0, 0
-        if kind == "sum_of_two":
-            self.adding += self.costs.adding
-            return self.costs.adding, sum(worker.rows[key] for key in task.needs)
+        if kind != "sum_of_part":
+            adding = self.costs.adding * (len(task.needs) - 1)
+            self.adding += adding
+            return adding, sum(worker.rows[key] for key in task.needs)
         rows = self.part_rows[task.key]
         reading = rows * self.costs.row_bytes / self.costs.storage
         factor = float(np.exp(self.costs.spread * self.rng.standard_normal())) if self.costs.spread else 1.0

@@ -8,8 +8,7 @@ from typing import Any
 from benchmarks.far.costs import Costs
 from benchmarks.far.measured import ROW_BYTES, Machine, measure
 from benchmarks.far.simulation import Outcome, simulate
-from unconstrain.recordings.source import BATCH_ROWS
-from unconstrain.scaling.cluster import divide, rows_of_part
+from unconstrain.scaling.cluster import LEAST_ROWS, divide, rows_of_part
 from unconstrain.scaling.tree import Tree, plant
 
 GROUP_ROWS = 1_000_000
@@ -64,15 +63,16 @@ class Design:
 
 OURS = Design("ours")
 DESIGNS = (
-    Design("before: tasks one by one, sizes unknown", one_by_one=True, says_sizes=False),
-    Design("one graph, sizes unknown", says_sizes=False),
+    Design(
+        "before: 4 parts a worker, tasks one by one, sizes unknown", 5, 4, one_by_one=True, says_sizes=False
+    ),
+    Design("4 parts a worker, sizes unknown", 5, 4, says_sizes=False),
+    Design("4 parts a worker", 5, 4),
     OURS,
-    Design("one part a worker", parts_per_worker=1),
-    Design("16 parts a worker", parts_per_worker=16),
+    Design("16 parts a worker", 5, 16),
     Design("eight sums added at a time", arity=8),
     Design("float32 on the way", digits=0.5),
     Design("one fold (λ a number)", folds=1),
-    Design("one fold, one part a worker", folds=1, parts_per_worker=1),
 )
 
 
@@ -95,7 +95,9 @@ def _groups(n_rows: int) -> tuple[int, ...]:
     return (GROUP_ROWS,) * (n_rows // GROUP_ROWS)
 
 
-def costs_of(machine: Machine, P: int, n_rows: int, n_workers: int, design: Design, slower: float = 1.0) -> Costs:
+def costs_of(
+    machine: Machine, P: int, n_rows: int, n_workers: int, design: Design, slower: float = 1.0
+) -> Costs:
     """Put together what a pass costs; rows take `slower` times as long as by the inconsistency."""
     model = machine.models[P]
     packed = design.folds * model.packed * design.digits
@@ -123,7 +125,7 @@ def plan(n_rows: int, n_workers: int, design: Design) -> tuple[Tree, dict[Any, i
         wanted = rows_of_part(source, n_workers)
     else:
         wanted = -(-n_rows // (design.parts_per_worker * n_workers))
-    parts = list(divide(source, max(BATCH_ROWS, wanted), None))
+    parts = list(divide(source, max(LEAST_ROWS, wanted), None))
     grow: Callable[..., Tree] = plant if design.arity == 2 else _bushy(design.arity)
     tree = grow((_nothing,), parts, _nothing, _nothing)
     return tree, {key: part.stop - part.start for key, part in zip(tree.parts, parts, strict=True)}

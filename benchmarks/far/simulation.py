@@ -67,7 +67,13 @@ class Outcome:
 
 
 def simulate(
-    tree: Tree, rows: dict[Any, int], n_workers: int, costs: Costs, *, timed: bool = True, one_by_one: bool = False
+    tree: Tree,
+    rows: dict[Any, int],
+    n_workers: int,
+    costs: Costs,
+    *,
+    timed: bool = True,
+    one_by_one: bool = False,
 ) -> Outcome:
     """Make a pass.
 
@@ -131,7 +137,9 @@ class _Pass:
         begun = max(arrived, self.free_at)
         for name, messages, packing in self.driven.collect():
             took += packing + self.costs.message if self.timed else 0.0
-            self._at(begun + took + self.costs.delay, lambda now, n=name, m=messages: self._deliver(now, n, m))
+            self._at(
+                begun + took + self.costs.delay, lambda now, n=name, m=messages: self._deliver(now, n, m)
+            )
         self.free_at = begun + took
         self.busy += took
 
@@ -185,11 +193,18 @@ class _Pass:
         if not worker.fetching and worker.running is None:
             worker.fetches_since = now
         worker.fetching.add(key)
-        holder = min((self.workers[name] for name in self.driven.holders(key)), key=lambda each: each.sends_until)
+        holder = min(
+            (self.workers[name] for name in self.driven.holders(key)), key=lambda each: each.sends_until
+        )
         is_setup = key[0].startswith("setup")
         size = self.costs.setup if is_setup else self.costs.packed
         begun = max(now, holder.sends_until, worker.takes_until)
-        end = begun + size / self.costs.network + (0.0 if is_setup else 2 * self.costs.packing) + 2 * self.costs.delay
+        end = (
+            begun
+            + size / self.costs.network
+            + (0.0 if is_setup else 2 * self.costs.packing)
+            + 2 * self.costs.delay
+        )
         holder.sends_until = worker.takes_until = end
         self.moved += size
         rows = holder.rows[key]
@@ -218,7 +233,16 @@ class _Pass:
                 worker.fetches_since = stop
             worker.hold(task.key, rows)
             size = self.costs.setup if task.key[0].startswith("setup") else self.costs.result
-            self._tell(stop, self.driven.finished, worker.address, task.key, task.run_id, int(size), stop - max(stop - now, TICK), stop)
+            self._tell(
+                stop,
+                self.driven.finished,
+                worker.address,
+                task.key,
+                task.run_id,
+                int(size),
+                stop - max(stop - now, TICK),
+                stop,
+            )
             self._go_on(stop, worker)
 
         self._at(now + seconds, finish)
@@ -244,7 +268,10 @@ class _Pass:
 def _apart(tasks: dict) -> list[tuple[dict, list]]:
     """Make a graph of each task, as `Client.submit` does."""
     return [
-        ({key: Task_(key, call, *(TaskRef(each) if _is_key(each, tasks) else each for each in arguments))}, [key])
+        (
+            {key: Task_(key, call, *(TaskRef(each) if _is_key(each, tasks) else each for each in arguments))},
+            [key],
+        )
         for key, (call, *arguments) in tasks.items()
     ]
 

@@ -9,7 +9,7 @@ from benchmarks.far.measured import measure
 SIZES = (10**9, 10**12)
 WORKERS = (1, 10, 100, 1000)
 MANY = 10_000
-DESIGNED_FOR = ((100, 10**9, 1000), (1000, 10**9, 1000), (10_000, 10**9, 100), (1000, 10**12, 1000))
+DESIGNED_FOR = ((100, 10**9, 100), (100, 10**9, 1000), (1000, 10**9, 1000), (10_000, 10**9, 100))
 SHARES = ("computing", "storage", "adding", "fetching", "idle")
 
 
@@ -40,7 +40,7 @@ def _passes() -> Table:
         title="one pass of the inconsistency, five folds: shares of the workers' time",
     )  # fmt: skip
     cases = [(rows, P, n) for rows in SIZES for P in measure().models for n in WORKERS]
-    for rows, P, n in [*cases, (10**12, 100, MANY), (10**12, 1000, MANY)]:
+    for rows, P, n in [*cases, (10**12, 1000, MANY)]:
         done = carry_out(P, rows, n)
         parts = [done.share(each) for each in (done.computing, done.reading, done.adding, done.fetching)]
         shares = [f"{share:.1%}" for share in (*parts, 1.0 - sum(parts))]

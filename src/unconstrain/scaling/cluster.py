@@ -39,10 +39,21 @@ from unconstrain.scaling.tree import plant
 
 __all__ = ["connected", "fit"]
 
-PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
+PARTS_PER_THREAD, MOST_PARTS_PER_THREAD = 4, 16
+"""So that a slow worker, or one that is lost, holds up little: the more, the less all wait for the last one to finish."""
 
-GROUPS_PER_THREAD = 2
-"""Where there are as many row groups, parts are whole ones: what lies before a part in its row group is decoded too."""
+ENOUGH_ROWS = 1_000_000
+"""Of a part, beyond the fewest parts a thread: smaller ones would keep the scheduler busy and no worker."""
+
+MOST_PARTS = 10_000
+"""Beyond the fewest parts a thread: so many keep the scheduler busy for a few seconds."""
+
+LEAST_ROWS = 8192
+"""Of a part by itself, which takes some milliseconds to begin with."""
+
+GROUPS_PER_THREAD = 3
+"""Where there are as many row groups, parts are whole ones: what lies before a part in its row group is decoded too. Up to
+two tasks a thread Dask sends to the worker that holds what they need, until others steal them."""
 
 LARGEST_GRAPH = "2 GiB"
 
@@ -124,7 +135,7 @@ def fit(
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed.
     part_rows : int, optional
-        How many rows, at least, a task adds up; by default as many as make four tasks a thread.
+        How many rows, at least, a task adds up; by default as many as make 4 to 16 tasks a thread.
     random_state : int, optional
         Of the sample of rows.
 
@@ -146,7 +157,7 @@ def fit(
     check_episodes(policy, source, partial=partial)
     accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
-    rows = part_rows or max(batch_rows, rows_of_part(source, threads))
+    rows = part_rows or max(min(batch_rows, LEAST_ROWS), rows_of_part(source, threads))
     parts = list(divide(source, rows, accumulator.folds))
     with reporting(progress) as report:
 
@@ -187,7 +198,9 @@ def _inferred(
 
 def rows_of_part(source: Tables, threads: int) -> int:
     """Decide how many rows a task should add up, at least, to keep so many threads busy."""
-    wanted = -(-source.n_rows // (PARTS_PER_THREAD * threads))
+    fewest = PARTS_PER_THREAD * threads
+    most = min(MOST_PARTS_PER_THREAD * threads, max(MOST_PARTS, fewest))
+    wanted = min(-(-source.n_rows // fewest), max(-(-source.n_rows // most), ENOUGH_ROWS))
     groups = source.row_groups
     return wanted if len(groups) < GROUPS_PER_THREAD * threads else max(wanted, max(groups) // 2 + 1)
 

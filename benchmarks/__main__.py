@@ -3,6 +3,7 @@
 python -m benchmarks                      all
 python -m benchmarks local-fit growth     some
 python -m benchmarks models               which kind of policy for which data: errors and times, no ratios to reach
+python -m benchmarks how-far              a pass over 10^9 and 10^12 rows on simulated clusters, in some minutes
 python -m benchmarks rivals               our policies beside GMR, LPV-DS, DMP and behaviour cloning, simulated
 python -m benchmarks rivals-handwriting   the same and SEDS on handwriting; needs --data=FOLDER
 python -m benchmarks rivals-wiping        those without a goal on wiping; needs --data=FOLDER
@@ -25,6 +26,7 @@ from rich.table import Table
 
 import unconstrain as uc
 from benchmarks import cluster, fits, identifiability, models, start, step, stream, viewer
+from benchmarks.far import tables as how_far
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -53,6 +55,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
 
 TABLES: dict[str, Callable[[Path | None], None]] = {
     "models": lambda _: models.print_tables(),
+    "how-far": lambda _: how_far.print_tables(),
     "rivals": lambda _: simulated.print_tables(),
     "rivals-handwriting": handwriting.print_table,
     "rivals-wiping": wiping.print_table,

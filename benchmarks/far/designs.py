@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks.far.costs import Costs
 from benchmarks.far.measured import ROW_BYTES, Machine, measure
 from benchmarks.far.simulation import Outcome, simulate
-from unconstrain.scaling.cluster import LEAST_ROWS, divide, rows_of_part
+from unconstrain.scaling.dividing import LEAST_ROWS, divide, rows_of_part
 from unconstrain.scaling.tree import Tree, plant
 
 GROUP_ROWS = 1_000_000
@@ -131,6 +131,7 @@ def plan(n_rows: int, n_workers: int, design: Design) -> tuple[Tree, dict[Any, i
     return tree, {key: part.stop - part.start for key, part in zip(tree.parts, parts, strict=True)}
 
 
+@cache
 def carry_out(P: int, n_rows: int, n_workers: int, design: Design = OURS, slower: float = 1.0) -> Outcome:
     """Simulate a pass."""
     costs = costs_of(measure(), P, n_rows, n_workers, design, slower)

@@ -1,4 +1,4 @@
-"""Dask's own scheduler without a network: every message that it takes and sends passes through its code, and is timed."""
+"""Dask's own scheduler without a network: every message it takes and sends passes through its code, and is timed."""
 
 import pickle
 import time

@@ -21,7 +21,6 @@ from benchmarks.far.driven import CLIENT, DrivenScheduler
 from benchmarks.far.worker import Task, Worker
 from unconstrain.scaling.tree import Tree
 
-
 TICK = 1e-6
 """Seconds that Dask is told of a task that takes none: it knows of no such tasks."""
 

@@ -30,7 +30,7 @@ SEVERAL = 8
 """How many times as many boxes are told apart before they become coarser."""
 
 PROBED = 4096
-"""States that are looked at first: where they alone lie in too many boxes, so do all, and nothing is sorted for those."""
+"""States that are looked at first: where they alone lie in too many boxes, so do all, and none are sorted for those."""
 
 LARGEST = 2.0**62
 """Number of a box beyond which there is no telling it from the next."""

@@ -1,4 +1,4 @@
-"""The tasks of a pass on a cluster, as Dask takes them: parts are summed, and neighbours added until one sum is left."""
+"""The tasks of a pass on a cluster, as Dask takes them: parts are summed, and neighbours added until one is left."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

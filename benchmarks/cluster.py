@@ -2,11 +2,10 @@
 
 Both fit the same policy to the same files, so efficiency is the processor time of the one worker divided by that of the
 four together: 1 where dividing, serializing and adding cost nothing. It does not count cores, so that four workers may
-share two of them. Not counted are what workers use while they wait, which Dask's heartbeats and its profiler take for
-each second that passes however much is done in it, and what a first fit imports.
+share two of them. Not counted is what workers take for each second that passes, however much is done in it: heartbeats,
+and Dask's profiler, which is switched off; nor what a first fit imports.
 """
 
-import statistics
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -47,11 +46,13 @@ def _efficiency(name: str, rows: int, model: str, policy: Callable[[], Any]) -> 
 
 
 def _processor_seconds(rows: int, policy: Callable[[], Any]) -> list[float]:
-    """Return the processor seconds of a fit on 1 and on `WORKERS` workers, medians of fits that take turns."""
+    """Return the processor seconds of a fit on 1 and on `WORKERS` workers, the least of fits that take turns."""
+    import dask
     import distributed
 
     folder = str(_folder(rows))
     with ExitStack() as stack:
+        stack.enter_context(dask.config.set({"distributed.worker.profile.enabled": False}))
         clients = []
         for n in (1, WORKERS):
             cluster = stack.enter_context(
@@ -68,7 +69,7 @@ def _processor_seconds(rows: int, policy: Callable[[], Any]) -> list[float]:
             fit(client, 0.0)
         idle = [_idle(client) for client in clients]
         times = [[fit(*each) for each in zip(clients, idle, strict=True)] for _ in range(REPEATS)]
-    return [statistics.median(each) for each in zip(*times, strict=True)]
+    return [min(each) for each in zip(*times, strict=True)]
 
 
 def _idle(client: Any) -> float:

@@ -25,10 +25,10 @@ def measure_sampled(n_rows: int, shares: tuple[float, ...]) -> dict[tuple[int, s
     return errors
 
 
-def _policy(X: np.ndarray) -> uc.ParametricPolicy:
-    return uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:: len(X) // 14][:14].copy(), width=2.0))
+def _policy(X: np.ndarray) -> uc.LocallyLinearPolicy:
+    return uc.LocallyLinearPolicy(centers=X[:: len(X) // 14][:14].copy())
 
 
-def _error(policy: uc.ParametricPolicy, X: np.ndarray) -> float:
+def _error(policy: uc.LocallyLinearPolicy, X: np.ndarray) -> float:
     Pi = np.sin(X) - 2.0 * X
     return float(np.mean((policy.predict(X) - Pi) ** 2) / np.mean(Pi**2))

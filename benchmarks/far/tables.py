@@ -47,11 +47,12 @@ def _passes() -> Table:
     cases = [(rows, P, n) for rows in SIZES for P in measure().models for n in WORKERS]
     for rows, P, n in cases:
         done = carry_out(P, rows, n)
+        held = done.most_held * OURS.folds * measure().models[P].in_memory
         parts = [done.share(each) for each in (done.computing, done.reading, done.adding, done.fetching)]
         shares = [f"{share:.1%}" for share in (*parts, 1.0 - sum(parts))]
         table.add_row(
             f"{rows:.0e}", f"{P:,}", f"{n:,}", f"{done.n_tasks // 2:,}", _span(done.seconds), *shares,
-            f"{done.scheduler / done.seconds:.1%}", _size(done.moved), _size(done.most_held * OURS.folds * measure().models[P].in_memory),
+            f"{done.scheduler / done.seconds:.1%}", _size(done.moved), _size(held),
             f"{1e3 * done.scheduler / done.n_tasks:.2f}",
         )  # fmt: skip
     return table
@@ -95,7 +96,7 @@ def _fits() -> Table:
 def _sampled() -> Table:
     table = Table(
         "rows that contact is inferred from", "then", "error", "beside all of them",
-        title=f"contact inferred from a sample: {MANY_ROWS:,} rows, 7 dimensions, 14 RBFs, half free, 5 % noise",
+        title=f"contact inferred from a sample: {MANY_ROWS:,} rows, 14 local models in 7 dimensions, half free",
     )  # fmt: skip
     errors = measure_sampled(MANY_ROWS, SHARES_SAMPLED)
     for (rows, then), error in errors.items():

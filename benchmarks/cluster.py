@@ -17,7 +17,7 @@ from benchmarks.stream import ACTION, STATE, _folder, _local_policy
 
 ROWS = 8_000_000
 WORKERS = 4
-REPEATS = 5
+REPEATS = 3
 IDLE_SECONDS = 3.0
 
 
@@ -33,7 +33,7 @@ def linear(rows: int = ROWS) -> Ratio:
 
 def local(rows: int = ROWS) -> Ratio:
     """50 local models, whose moments are 50 times as many numbers."""
-    return _efficiency("cluster-efficiency-local", rows // 4, "50 local models", _local_policy)
+    return _efficiency("cluster-efficiency-local", rows // 8, "50 local models", _local_policy)
 
 
 BENCHMARKS = {"cluster-efficiency": linear, "cluster-efficiency-local": local}

@@ -239,7 +239,7 @@ def test_what_travels_is_what_the_documentation_says(tmp_path, client):
             tmp_path / name, *(np.tile(each.T, times).T for each in (X, U)), np.tile(EPISODES, times),
             np.tile(TIME, times), [100],
         )  # fmt: skip
-        tables = uc.open(folder, **COLUMNS).source
+        tables = pickle.loads(pickle.dumps(uc.open(folder, **COLUMNS).source))
         policy = uc.ParametricPolicy(risk="inconsistency", alpha="cv")
         empty = stream.begin(policy, tables, 100, 0, partial=False)
         folds = {label: i % 5 for i, label in enumerate(np.unique(EPISODES).tolist())}

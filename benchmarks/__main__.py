@@ -3,7 +3,7 @@
 python -m benchmarks                      all
 python -m benchmarks local-fit growth     some
 python -m benchmarks models               which kind of policy for which data: errors and times, no ratios to reach
-python -m benchmarks how-far              a pass over 10^9 and 10^12 rows on simulated clusters, in some minutes
+python -m benchmarks how-far              a pass over 10^9 and 10^12 rows on simulated clusters, in ten minutes
 python -m benchmarks rivals               our policies beside GMR, LPV-DS, DMP and behaviour cloning, simulated
 python -m benchmarks rivals-handwriting   the same and SEDS on handwriting; needs --data=FOLDER
 python -m benchmarks rivals-wiping        those without a goal on wiping; needs --data=FOLDER

@@ -3,6 +3,7 @@
 python -m benchmarks                      all
 python -m benchmarks local-fit growth     some
 python -m benchmarks models               which kind of policy for which data: errors and times, no ratios to reach
+python -m benchmarks how-far              a pass over 10^9 and 10^12 rows on simulated clusters, in ten minutes
 python -m benchmarks rivals               our policies beside GMR, LPV-DS, DMP and behaviour cloning, simulated
 python -m benchmarks rivals-handwriting   the same and SEDS on handwriting; needs --data=FOLDER
 python -m benchmarks rivals-wiping        those without a goal on wiping; needs --data=FOLDER
@@ -26,6 +27,7 @@ from rich.table import Table
 
 import unconstrain as uc
 from benchmarks import (
+    cluster,
     fits,
     identifiability,
     latency,
@@ -39,6 +41,7 @@ from benchmarks import (
     warm,
     wide,
 )
+from benchmarks.far import tables as how_far
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -65,6 +68,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-linear-memory": stream.linear_memory,
     "stream-local-memory": stream.local_memory,
     **warm.BENCHMARKS,
+    **cluster.BENCHMARKS,
     **step.BENCHMARKS,
     **latency.BENCHMARKS,
     **predict.BENCHMARKS,
@@ -75,6 +79,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
 TABLES: dict[str, Callable[[Path | None], None]] = {
     "models": lambda _: models.print_tables(),
     "wider": lambda _: wide.wider(),
+    "how-far": lambda _: how_far.print_tables(),
     "rivals": lambda _: simulated.print_tables(),
     "rivals-handwriting": handwriting.print_table,
     "rivals-wiping": wiping.print_table,

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from unconstrain.fitting import region
 from unconstrain.fitting.region import MOST_BOXES, Region
 
 
@@ -22,3 +23,15 @@ def test_boxes_hold_all_samples_whatever_the_order_and_grouping(n):
     far = Z + 1e9 * unit
     np.testing.assert_allclose(whole.distance(far), 1e9 * np.sqrt(n), rtol=1e-3)
     assert np.isinf(whole.distance(np.full((1, n), 1e300)))[0]
+
+
+@pytest.mark.parametrize("n", [2, 7])
+def test_looking_at_some_states_first_changes_nothing(n, monkeypatch):
+    rng = np.random.default_rng(n)
+    for Z in (rng.uniform(-3, 3, size=(3000, n)), rng.normal(0, 0.02, size=(3000, n)).cumsum(axis=0)):
+        whole = Region.of(Z, np.full(n, 0.5))
+        monkeypatch.setattr(region, "PROBED", 700)
+        probed = Region.of(Z, np.full(n, 0.5))
+        assert probed.coarseness == whole.coarseness
+        np.testing.assert_array_equal(probed.boxes, whole.boxes)
+        monkeypatch.undo()

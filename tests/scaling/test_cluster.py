@@ -1,4 +1,5 @@
 import os
+import pickle
 import signal
 import sys
 
@@ -12,6 +13,7 @@ from tests.scaling import test_stream_adaptive as adaptive
 from tests.scaling import test_stream_known as known
 from tests.scaling.test_stream import COLUMNS, EPISODES, ROLES, TIME, U, X, assert_same_fit, policies, spoilt
 from unconstrain.scaling import cluster as distributed
+from unconstrain.scaling import stream
 from unconstrain.scaling.stream import fit_stream
 
 dask = pytest.importorskip("distributed")
@@ -228,3 +230,39 @@ def test_contact_is_inferred_in_as_many_passes_as_it_takes(tmp_path, client, mak
     if not derived:
         adaptive.assert_same(policy, make().fit(adaptive.X, adaptive.U, groups=adaptive.EPISODES))
         assert policy.resume().folds.fold_of == whole.resume().folds.fold_of
+
+
+def test_what_travels_is_what_the_documentation_says(tmp_path, client):
+    sizes = []
+    for name, times in (("once", 1), ("thrice", 3)):
+        folder = written.write(
+            tmp_path / name, *(np.tile(each.T, times).T for each in (X, U)), np.tile(EPISODES, times),
+            np.tile(TIME, times), [100],
+        )  # fmt: skip
+        tables = pickle.loads(pickle.dumps(uc.open(folder, **COLUMNS).source))
+        policy = uc.ParametricPolicy(risk="inconsistency", alpha="cv")
+        empty = stream.begin(policy, tables, 100, 0, partial=False)
+        folds = {label: i % 5 for i, label in enumerate(np.unique(EPISODES).tolist())}
+        part = distributed._sum_of_part(
+            distributed.Setup(empty, tables, 50), distributed.Part(0, tables.n_rows, folds)
+        )
+        sizes.append(len(pickle.dumps(part)))
+    P = part.accumulator.total.moments[0].g.shape[0]
+    assert (
+        0 <= sizes[0] - 5 * 8 * (P * (P + 1) // 2 + P) < 8000
+    )  # beside them: the model, and where states lie
+    assert abs(sizes[1] - sizes[0]) < 1000
+
+    def sent(dask_worker):
+        return dask_worker.transfer_outgoing_bytes_total
+
+    before = sum(client.run(sent).values())
+    distributed.fit(
+        uc.ParametricPolicy(risk="inconsistency", alpha="cv"),
+        uc.open(folder, **COLUMNS),
+        client,
+        part_rows=50,
+    )
+    moved = sum(client.run(sent).values()) - before
+    n_parts = len(list(distributed.divide(tables, 50, None)))
+    assert 0 < moved <= (n_parts - 1) * sys.getsizeof(part) + 10_000

@@ -122,6 +122,11 @@ class CorrectedMoments:
         return self.along.n_samples + (0 if self.known is None else self.known.n_samples)
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of memory that the moments take."""
+        return sum(each.nbytes for each in (self.along, self.whole, self.known) if each is not None)
+
+    @property
     def weight(self) -> np.ndarray:
         """`Σ ω` of all samples, for each model."""
         return self.whole.weight if self.known is None else self.whole.weight + self.known.weight

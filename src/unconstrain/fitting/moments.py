@@ -92,6 +92,12 @@ class Moments:
             None if here is None or there is None else here + there,
         )
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that the arrays take."""
+        own = self.H.nbytes + self.g.nbytes + np.asarray(self.squares).nbytes + np.asarray(self.weight).nbytes
+        return own + (0 if self.everywhere is None else self.everywhere.nbytes)
+
     def __getstate__(self) -> dict[str, Any]:
         # Of the symmetric H a triangle says everything, in files and on the way to other machines.
         P = self.H.shape[-1]

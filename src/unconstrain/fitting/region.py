@@ -29,6 +29,9 @@ MOST_BOXES = 512
 SEVERAL = 8
 """How many times as many boxes are told apart before they become coarser."""
 
+PROBED = 4096
+"""States that are looked at first: where they alone lie in too many boxes, so do all, and none are sorted for those."""
+
 LARGEST = 2.0**62
 """Number of a box beyond which there is no telling it from the next."""
 
@@ -72,6 +75,8 @@ class Region:
         Region
             Of these states.
         """
+        if len(Z) >= 2 * PROBED:
+            coarseness = cls.of(Z[:: len(Z) // PROBED], unit, coarseness).coarseness
         compiled = loops.load_for(len(Z), "grid")
         if compiled is not None:
             rows = np.empty(SEVERAL * MOST_BOXES, dtype=np.int64)

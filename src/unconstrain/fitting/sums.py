@@ -105,6 +105,11 @@ class Sums:
         return sum(part.n_samples for part in self.present)
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of memory that the moments take."""
+        return sum(part.nbytes for part in (*self.moments, *self.judges) if part is not None)
+
+    @property
     def misjudged(self) -> bool:
         """Whether a sample was counted as motion that has none beside the longest action."""
         return self.shortest <= NO_MOTION * self.longest

@@ -52,6 +52,10 @@ class File:
     path: str
     filesystem: Any
 
+    def __getstate__(self) -> dict[str, Any]:
+        # pyarrow's account of a file cannot be sent to another process, which asks for its own.
+        return {name: value for name, value in self.__dict__.items() if name != "info"}
+
     @property
     def name(self) -> str:
         """The last part of the path."""

@@ -6,7 +6,7 @@ the workers. Which fold an episode belongs to is decided before, by a pass over 
 the fold `fit_stream` puts it in. Data are divided once, however many passes it takes to infer contact.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from unconstrain.recordings.notes import Note, combine
 from unconstrain.recordings.source import BATCH_ROWS, Openable
 from unconstrain.recordings.tables import Tables
 from unconstrain.scaling.connection import as_finished, connected
+from unconstrain.scaling.dividing import LEAST_ROWS, Part, divide, rows_of_part
 from unconstrain.scaling.stream import (
     SAMPLE_ROWS,
     PolicyT,
@@ -35,23 +36,11 @@ from unconstrain.scaling.stream import (
     source_for,
     to_learn_from,
 )
+from unconstrain.scaling.tree import plant
 
 __all__ = ["connected", "fit"]
 
-PARTS_PER_THREAD = 4  # so that a slow worker, or one that is lost, holds up little
-
-
-@dataclass(frozen=True)
-class Part:
-    """Rows `start` to `stop`, and the folds of the episodes in them; None where episodes are dealt out on the spot.
-
-    Those are dealt out after `n_before` of other parts, once it is known how many there are.
-    """
-
-    start: int
-    stop: int
-    fold_of: dict[Any, int] | None
-    n_before: int | None = None
+LARGEST_GRAPH = "2 GiB"
 
 
 @dataclass(frozen=True)
@@ -62,8 +51,21 @@ class Added:
     notes: tuple[Note, ...] = ()
     dealt: tuple[int, ...] = ()
 
+    def __sizeof__(self) -> int:
+        # Dask adds sums up where they are, if it knows how large they are.
+        return self.accumulator.total.nbytes
 
-Setup = tuple[Accumulator, Tables, int]
+
+@dataclass(frozen=True)
+class Setup:
+    """What all parts have in common: what they are added to, where they are read from, and how many rows at a time."""
+
+    empty: Accumulator
+    source: Tables
+    batch_rows: int
+
+    def __dask_tokenize__(self) -> int:
+        return self.batch_rows
 
 
 def fit(
@@ -101,7 +103,7 @@ def fit(
     sample_rows : int
         On how many rows centres and other features that depend on the data are placed.
     part_rows : int, optional
-        How many rows, at least, a task adds up; by default as many as make four tasks a thread.
+        How many rows, at least, a task adds up; by default as many as make 4 to 16 tasks a thread.
     random_state : int, optional
         Of the sample of rows.
 
@@ -123,7 +125,7 @@ def fit(
     check_episodes(policy, source, partial=partial)
     accumulator = begin(policy, source, sample_rows, random_state, partial=partial)
     threads = max(sum(client.nthreads().values()), 1)
-    rows = part_rows or max(batch_rows, -(-source.n_rows // (PARTS_PER_THREAD * threads)))
+    rows = part_rows or max(min(batch_rows, LEAST_ROWS), rows_of_part(source, threads))
     parts = list(divide(source, rows, accumulator.folds))
     with reporting(progress) as report:
 
@@ -162,110 +164,18 @@ def _inferred(
     return inference.result, notes
 
 
-def divide(source: Tables, rows: int, folds: EpisodeFolds | None) -> Iterator[Part]:
-    """Divide a source into parts, with the folds of their episodes, which are dealt out here.
-
-    Parameters
-    ----------
-    source : Tables
-        What is to be read.
-    rows : int
-        Rows in a part, at least.
-    folds : EpisodeFolds or None
-        Folds that deal episodes out; None where λ is a number.
-
-    Yields
-    ------
-    Part
-        In the order of the rows.
-    """
-    if source.whole_episodes_for or source.relabels:
-        bounds = list(_episode_starts(source, rows))
-        for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):
-            # Fragments of episodes are known, and dealt out, only once samples are prepared.
-            dealt = None if folds is None or source.relabels else _folds_of(source, start, stop, folds)
-            yield Part(start, stop, dealt)
-        return
-    if source.is_along_episodes:
-        bounds = list(_run_starts(source, rows))
-        for start, stop in zip(bounds, [*bounds[1:], source.n_rows], strict=True):
-            yield Part(start, stop, None if folds is None else _folds_of(source, start, stop, folds))
-        return
-    ends = np.cumsum(source.row_groups)
-    start = 0
-    for end in (int(end) for end in ends):
-        # Row groups are decoded as a whole, so parts end with one, unless one alone is many parts long.
-        cuts = [start + rows * i for i in range(1, (end - start) // rows)] if end - start >= 2 * rows else []
-        if end - start >= rows or end == source.n_rows:
-            for stop in (*cuts, end):
-                if stop > start:
-                    yield Part(start, stop, None if folds is None else _folds_of(source, start, stop, folds))
-                    start = stop
-
-
-def _folds_of(source: Tables, start: int, stop: int, folds: EpisodeFolds) -> dict[Any, int]:
-    own: dict[Any, int] = {}
-    for labels, _ in source.labels(start, stop):
-        fold = folds.assign(labels, len(labels))
-        firsts = np.concatenate([[True], labels[1:] != labels[:-1]])
-        own.update(zip(labels[firsts].tolist(), fold[firsts].tolist(), strict=True))
-    return own
-
-
-def _run_starts(source: Tables, rows: int) -> Iterator[int]:
-    """Where parts begin that have `rows` rows or more, and end with samples of an episode that follow each other."""
-    yield 0
-    before: Any = None
-    last = 0
-    for labels, start in source.labels(0, source.n_rows):
-        firsts = start + np.flatnonzero(np.concatenate([[labels[0] != before], labels[1:] != labels[:-1]]))
-        before = labels[-1]
-        while len(firsts := firsts[firsts >= last + rows]):
-            last = int(firsts[0])
-            yield last
-
-
-def _episode_starts(source: Tables, rows: int) -> Iterator[int]:
-    """Where parts of whole episodes begin; the episodes in between have `rows` rows or more."""
-    yield 0
-    current: Any = None
-    here: set[Any] = set()  # episodes of the part at hand
-    gone: set[Any] = set()  # those of earlier parts
-    last = 0
-    for labels, start in source.labels(0, source.n_rows, whole=True):
-        firsts = np.flatnonzero(np.concatenate([[labels[0] != current], labels[1:] != labels[:-1]]))
-        for at in firsts.tolist():
-            current = labels[at]
-            if start + at - last >= rows and current not in here:
-                last = start + at
-                gone |= here
-                here = set()
-                yield last
-            if current in gone:
-                raise DataError(
-                    f"episode {current} goes on at row {start + at} (counted from 0 over all files) after others were "
-                    f"read; to {source.whole_episodes_for or 'divide'} the data, sort them by episode"
-                )
-            here.add(current)
-
-
 def _added_up(
     client: Any, empty: Accumulator, source: Tables, batch_rows: int, parts: list[Part], report: Report
 ) -> Added:
+    import dask
     import distributed
 
-    # A task, not scattered data: what a lost worker held of it can then be made again.
-    setup = client.submit(_setup, empty, source.in_one_thread(), batch_rows, pure=False)
-    level = [client.submit(_sum_of_part, setup, part, pure=False) for part in parts]
-    rows = {future.key: part.stop - part.start for future, part in zip(level, parts, strict=True)}
-    left = list(level)
-    while len(level) > 1:
-        pairs = [
-            client.submit(_sum_of_two, a, b, pure=False)
-            for a, b in zip(level[::2], level[1::2], strict=False)
-        ]
-        level = pairs + level[len(level) - len(level) % 2 :]
-    (total,) = level
+    setup = Setup(empty, source.in_one_thread(), batch_rows)
+    tree = plant((_same, setup), parts, _sum_of_part, _sum_of_two)
+    # Of many episodes the folds are megabytes, which Dask would warn of.
+    with dask.config.set({"distributed.admin.large-graph-warning-threshold": LARGEST_GRAPH}):
+        *left, total = client.get(tree.tasks, [*tree.parts, tree.total], sync=False)
+    rows = {future.key: part.stop - part.start for future, part in zip(left, parts, strict=True)}
     done = 0
     report(0, source.n_rows)
     try:
@@ -290,18 +200,17 @@ def _added_up(
             client.cancel([total, *left])
 
 
-def _setup(empty: Accumulator, source: Tables, batch_rows: int) -> Setup:
-    return empty, source, batch_rows
+def _same(setup: Setup) -> Setup:
+    return setup
 
 
 def _sum_of_part(setup: Setup, part: Part) -> Added:
-    empty, source, batch_rows = setup
-    accumulator = empty.empty(part.fold_of)
+    accumulator = setup.empty.empty(part.fold_of)
     if accumulator.folds is not None and part.n_before is not None:
         accumulator.folds.deal_unnamed(part.n_before)
     notes: tuple[Note, ...] = ()
     with threadpool_limits(1, user_api="blas"):
-        for block in source.blocks(batch_rows, part.start, part.stop):
+        for block in setup.source.blocks(setup.batch_rows, part.start, part.stop):
             loaded = block.load()
             samples = to_learn_from(accumulator, loaded)
             accumulator.include(accumulator.sums(samples, deal(accumulator, samples)))

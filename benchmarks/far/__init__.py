@@ -1,0 +1,1 @@
+"""How far a cluster carries a fit: Dask's own scheduler, driven by simulated workers on simulated time."""

@@ -470,8 +470,8 @@ def _array(what: str, values: ArrayLike) -> Array:
 
 
 def _check_finite(what: str, array: Array, good: NDArray[np.bool_]) -> None:
-    bad = np.argwhere(~good)
-    if len(bad):
+    if not good.all():
+        bad = np.argwhere(~good)
         row, *rest = bad[0].tolist()
         column = f", column {rest[0]}" if rest else ""
         raise DataError(

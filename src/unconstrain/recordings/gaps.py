@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.recordings.steps import typical_step
+from unconstrain.recordings.episodewise import percentile, step_norms
+from unconstrain.recordings.steps import order_of, typical_step
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -82,13 +83,14 @@ def split(
     -------
     Fragments
     """
-    order = np.argsort(episodes, kind="stable")
-    X, t, e = states[order], time[order], episodes[order]
+    order = order_of(episodes)
+    follow = bool(np.all(order[1:] > order[:-1]))
+    X, t, e = (states, time, episodes) if follow else (states[order], time[order], episodes[order])
     own = _runs(e)
     within = np.diff(e) == 0
     steps = np.diff(t)
     with np.errstate(divide="ignore", invalid="ignore"):  # steps between episodes, masked below
-        speeds = np.linalg.norm(np.diff(X, axis=0), axis=1) / steps
+        speeds = step_norms(X) / steps
     longest = np.full(len(own), np.inf if gap is None else gap)
     if gap is None:
         for code, one in enumerate(own):
@@ -104,21 +106,30 @@ def split(
     origins: list[tuple[int, int]] = []
     dropped = suspicious = 0
     for code, one in enumerate(own):
-        parts = [slice(one.start + part.start, one.start + part.stop) for part in _runs(fragment[one])]
+        whole = fragment[one.start] == fragment[one.stop - 1]
+        parts = (
+            [one]
+            if whole
+            else [slice(one.start + part.start, one.start + part.stop) for part in _runs(fragment[one])]
+        )
         good = [part for part in parts if (len(parts) == 1 and not drop_short) or long_enough(t[part])]
         dropped += len(parts) - len(good)
         for number, part in enumerate(good, start=1):
             kept[part], codes[part] = True, len(origins)
             origins.append((code, number if len(good) > 1 else 0))
-        own_speeds = speeds[one.start : one.stop - 1][unbroken[one.start : one.stop - 1]]
-        typical = np.percentile(own_speeds, 95) if len(own_speeds) else 0.0
+        own_speeds = speeds[one.start : one.stop - 1]
+        if not whole:
+            own_speeds = own_speeds[unbroken[one.start : one.stop - 1]]
+        typical = percentile(own_speeds, 95) if len(own_speeds) else 0.0
         suspicious += int(np.sum(own_speeds > SUSPICIOUS * typical)) if typical > 0 else 0
 
-    back = np.argsort(order, kind="stable")  # to the order of the file
-    samples = np.flatnonzero(kept[back])
+    if not follow:  # to the order of the file
+        back = np.argsort(order, kind="stable")
+        kept, codes = kept[back], codes[back]
+    samples = np.flatnonzero(kept)
     return Fragments(
         samples=samples,
-        episodes=codes[back][samples],
+        episodes=codes[samples],
         origins=tuple(origins),
         gaps=int(gaps.sum()),
         fast=int(fast.sum()),

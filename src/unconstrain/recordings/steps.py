@@ -44,12 +44,22 @@ def comes_in_bursts(steps: NDArray[Any], second: float = 1.0) -> bool:
     """Whether most steps (M,) are much shorter than what passes between samples; a `second` is in their unit."""
     if len(steps) < 2:
         return False
+    least = steps.min()
+    if least > 0 and steps.max() <= LONG_STEPS * least:
+        return False  # whatever their median is
     long = steps[steps > LONG_STEPS * np.median(steps)]
     return len(long) > BURSTS * len(steps) and bool(np.median(long) <= BETWEEN * second)
 
 
+def order_of(codes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the order (N,) of samples episode by episode, where `codes` (N,) number the episodes."""
+    if np.all(codes[1:] >= codes[:-1]):
+        return np.arange(len(codes))
+    return np.argsort(codes, kind="stable")
+
+
 def runs(codes: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Return the samples of each episode, in order, where `codes` (N,) number the episodes from 0."""
-    order = np.argsort(codes, kind="stable")
+    order = order_of(codes)
     bounds = [0, *np.cumsum(np.bincount(codes)).tolist()]
     return [order[a:b] for a, b in pairwise(bounds) if b > a]

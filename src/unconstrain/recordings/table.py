@@ -321,6 +321,9 @@ class Cells:
         DataError
             An empty cell or NaN, or values that cannot tell episodes apart.
         """
+        own = self._repeated_labels()
+        if own is not None:
+            return own
         values = self.filled()
         if pa.types.is_nested(values.type):
             raise DataError(
@@ -332,6 +335,16 @@ class Cells:
         elif not (pa.types.is_integer(values.type) or is_text(values.type)):
             values = values.cast(pa.string())
         return values.to_numpy(zero_copy_only=False)
+
+    def _repeated_labels(self) -> NDArray[Any] | None:
+        """Return the values of a column of text that holds each but once, with its places; None for another column."""
+        kind = self.values.type
+        if not pa.types.is_dictionary(kind) or not is_text(kind.value_type) or self.values.null_count:
+            return None
+        distinct = pc.utf8_trim_whitespace(self.values.dictionary)
+        if distinct.null_count or pc.any(pc.equal(distinct, "")).as_py():
+            return None
+        return distinct.to_numpy(zero_copy_only=False)[self.values.indices.to_numpy()]
 
     def filled(self) -> Any:
         """Return the values as an Arrow array without missing ones; text is stripped of spaces around it.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.preparation import TIME_UNITS
-from unconstrain.recordings.steps import typical_step
+from unconstrain.recordings.steps import order_of, typical_step
 from unconstrain.recordings.table import Cells, is_text
 
 Codes = NDArray[np.int64]
@@ -197,7 +197,7 @@ def repeated(ticks: NDArray[Any], episodes: Codes) -> NDArray[np.bool_]:
 
 def _steps(ticks: NDArray[Any], episodes: Codes) -> tuple[Codes, NDArray[Any], NDArray[np.bool_]]:
     """Return the order (N,) of stamps episode by episode, the steps (N-1,) then, and which lie within an episode."""
-    order = np.argsort(episodes, kind="stable")
+    order = order_of(episodes)
     return order, np.diff(ticks[order]), np.diff(episodes[order]) == 0
 
 

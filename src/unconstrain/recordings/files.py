@@ -52,6 +52,10 @@ class File:
     path: str
     filesystem: Any
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what travels to another process, where the size and the like are asked for again."""
+        return {"shown": self.shown, "path": self.path, "filesystem": self.filesystem}
+
     @property
     def name(self) -> str:
         """The last part of the path."""

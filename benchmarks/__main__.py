@@ -24,7 +24,7 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, models, start, step, stream, viewer
+from benchmarks import fits, identifiability, loading, models, start, step, stream, viewer
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -45,6 +45,7 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-local": stream.local,
     "stream-linear-memory": stream.linear_memory,
     "stream-local-memory": stream.local_memory,
+    **loading.BENCHMARKS,
     **step.BENCHMARKS,
     **start.BENCHMARKS,
     **viewer.BENCHMARKS,

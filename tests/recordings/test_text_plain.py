@@ -13,7 +13,7 @@ from unconstrain.recordings.formats import kept, text
 from unconstrain.recordings.formats.text import Text
 
 ROWS = 1400  # longer than what is looked at to find the layout
-COLUMNS = dict(state=["x", "y"], action=["u", "v"], time="t", episode="run")
+COLUMNS = {"state": ["x", "y"], "action": ["u", "v"], "time": "t", "episode": "run"}
 
 
 def lines(separator: str = ",", stamps: str = "t", labels: str = "{}") -> list[str]:
@@ -73,10 +73,10 @@ def inserted(place: int, line: str):
     return lambda every: [*every[: place % len(every)], line, *every[place % len(every) :]]
 
 
-cells = ["", " ", "nan", "NA", "-9999", "1,5", '"1,5"', "inf", "1e3", " 2.5 ", "2.5 mm", "°", "1\0", "a", '"a\nb"', "0x1f",
-    "1D3", "# no", "//", "1.", "-", "007", "12", "+3", "1'000", "2024-01-01 12:00:00", "--", "50%"]  # fmt: skip
-rows = ["", "   ", "# comment", "% comment", " // comment", HEADER, "t,run", "Total,,,,,,", "stopped by the user", ",,,,,,",
-    "\0\0\0", "1,2", '"', "s,,m,m,m/s,m/s,", "1,0,1,1,1,1,1,1"]  # fmt: skip
+cells = ["", " ", "nan", "NA", "-9999", "1,5", '"1,5"', "inf", "1e3", " 2.5 ", "2.5 mm", "°", "1\0", "a", '"a\nb"',
+    "0x1f", "1D3", "# no", "//", "1.", "-", "007", "12", "+3", "1'000", "2024-01-01 12:00:00", "--", "50%"]  # fmt: skip
+rows = ["", "   ", "# comment", "% comment", " // comment", HEADER, "t,run", "Total,,,,,,", "stopped by the user",
+    ",,,,,,", "\0\0\0", "1,2", '"', "s,,m,m,m/s,m/s,", "1,0,1,1,1,1,1,1"]  # fmt: skip
 dirt = st.one_of(
     st.builds(replaced, st.integers(-60, ROWS), st.integers(0, 6), st.sampled_from(cells)),
     st.builds(inserted, st.sampled_from([0, 1, 3, 30, 700, ROWS - 1, -1, -2, -30]), st.sampled_from(rows)),

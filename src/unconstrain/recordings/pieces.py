@@ -1,6 +1,6 @@
 """Pieces of files, and their columns as arrays."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -175,12 +175,6 @@ def read_flags(pieces: Sequence[Piece], field: Field) -> Array:
     return np.concatenate([piece.cells(field, "free").flags() for piece in pieces])
 
 
-def read_labels(pieces: Sequence[Piece], field: Field) -> NDArray[Any]:
-    """Read the values (N,) that tell episodes apart. Raises `DataError` that names file, column and row of a gap."""
-    parts = [piece.alike(field, "episode").labels() for piece in pieces]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-
 def read_projections(
     pieces: Sequence[Piece], columns: Sequence[ColumnKey], d: int, *, check: bool = True
 ) -> Array:
@@ -221,19 +215,6 @@ def read_projections(
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def places(pieces: Sequence[Piece]) -> Callable[[int], str]:
-    """Return what says where in their files a row of these pieces is."""
-    bounds = np.cumsum([0, *(len(piece.rows) for piece in pieces)])
-
-    def place(index: int) -> str:
-        which = int(np.searchsorted(bounds, index, side="right")) - 1
-        piece = pieces[which]
-        at = piece.place(index - int(bounds[which]))
-        return f"{at} of {piece.format.file.shown}" if piece.file != pieces[0].file else at
-
-    return place
-
-
 def _fill(numbers: NDArray[Any], piece: Piece, columns: Places) -> bool:
     """Write a piece's columns into their rows of `numbers`; False if anything about them is unusual."""
     arrays: list[Any] = [None] * len(numbers)
@@ -251,10 +232,15 @@ def _fill(numbers: NDArray[Any], piece: Piece, columns: Places) -> bool:
         rows = _matrix(values, fields[0][1].width)
         if rows is None:
             return False
+        own = [(i, field.component) for i, field in fields]
+        if own == [(i, i) for i in range(len(numbers))] and rows.shape[1] == len(numbers):
+            numbers[...] = rows.T
+            return True
         for i, field in fields:
             arrays[i] = rows[:, field.component]
     if numbers.flags.c_contiguous:
-        np.stack(arrays, out=numbers)  # one operation, where threads would wait for each other at each of many
+        # One operation, where threads would wait for each other at each of many.
+        np.stack(arrays, out=numbers)
         return True
     for at in range(0, numbers.shape[1], BLOCK):
         np.stack([array[at : at + BLOCK] for array in arrays], out=numbers[:, at : at + BLOCK])

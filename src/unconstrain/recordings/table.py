@@ -337,14 +337,18 @@ class Cells:
         return values.to_numpy(zero_copy_only=False)
 
     def _repeated_labels(self) -> NDArray[Any] | None:
-        """Return the values of a column of text that holds each but once, with its places; None for another column."""
-        kind = self.values.type
-        if not pa.types.is_dictionary(kind) or not is_text(kind.value_type) or self.values.null_count:
+        """Return the values of a column of text, each made but once; None for another column, or with empty cells."""
+        values, kind = self.values, self.values.type
+        if isinstance(values, pa.ChunkedArray) or values.null_count:
             return None
-        distinct = pc.utf8_trim_whitespace(self.values.dictionary)
+        if is_text(kind):
+            values = values.dictionary_encode()
+        elif not (pa.types.is_dictionary(kind) and is_text(kind.value_type)):
+            return None
+        distinct = pc.utf8_trim_whitespace(values.dictionary)
         if distinct.null_count or pc.any(pc.equal(distinct, "")).as_py():
             return None
-        return distinct.to_numpy(zero_copy_only=False)[self.values.indices.to_numpy()]
+        return distinct.to_numpy(zero_copy_only=False)[values.indices.to_numpy()]
 
     def filled(self) -> Any:
         """Return the values as an Arrow array without missing ones; text is stripped of spaces around it.

@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import pyarrow as pa
 
-from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats import kept, labview, motion_capture, opensim, qualisys
@@ -21,12 +20,18 @@ from unconstrain.recordings.formats.base import (
     find_part,
     note_guesses,
 )
-from unconstrain.recordings.formats.text_encoding import begin_text, find_codec, is_compressed, members, read_text
+from unconstrain.recordings.formats.text_encoding import (
+    begin_text,
+    find_codec,
+    is_compressed,
+    members,
+    read_text,
+)
 from unconstrain.recordings.formats.text_layout import PROBED, find_layout
 from unconstrain.recordings.formats.text_lines import Layout, content, join_header, lines_of
-from unconstrain.recordings.formats.text_made import Made, Part, cells_of
+from unconstrain.recordings.formats.text_made import Part, cells_of
 from unconstrain.recordings.formats.text_parsing import parse
-from unconstrain.recordings.formats.text_plain import Plain, Wanted, read_plain
+from unconstrain.recordings.formats.text_plain import Plain, find_wanted, read_plain
 from unconstrain.recordings.formats.text_rows import Rows, begins_anew, find_rows
 from unconstrain.recordings.table import Column, Header
 from unconstrain.recordings.units import said_of_units, unit_in
@@ -105,7 +110,9 @@ class Text(OneFile):
         units = _units(layout)
         for place, (name, cell, unit) in enumerate(zip(layout.names, layout.cells, units, strict=True)):
             nth = seen[name] = seen.get(name, -1) + 1
-            kind = cell.kind if not isinstance(cell, int) else read[cell].type if cell in read else pa.string()
+            kind = (
+                cell.kind if not isinstance(cell, int) else read[cell].type if cell in read else pa.string()
+            )
             width = layout.widths.get(place, 0)
             if not width or not name:
                 columns.append(Column(name, kind, None, nth, unit=unit))
@@ -234,35 +241,19 @@ class Text(OneFile):
             return None
         plain = kept.find(self)
         if plain is None and self._may_be_plain:
-            plain = read_plain(self.file, self._begun, self._find_wanted(self._begun))
+            layout = self._begun
+            plain = read_plain(
+                self.file, layout, find_wanted(self._header(layout, {}), layout, self.wanted.read)
+            )
         if plain is None:
             self._is_unusual = True
         else:
             kept.keep(self, plain, plain.n_bytes)
         return plain
 
-    def _find_wanted(self, layout: Layout) -> Wanted:
-        """Find the cells that will be read; none where columns are wanted that are not there."""
-        header = self._header(layout, {})
-        try:
-            roles = {role: header.find(role, keys) for role, keys in self.wanted.read.items()}
-        except DataError:
-            return Wanted(())
-        places: dict[ColumnKey, int | Made] = {}
-        for column, cell in zip(header.columns, layout.cells, strict=True):
-            places[column.name, column.nth] = cell
-        own = {role: [places[field.key] for field in fields] for role, fields in roles.items()}
-        made = [cell for cell in layout.cells if not isinstance(cell, int)]
-        every = [cell for cells in (own.values() if own else [layout.cells]) for cell in (*cells, *made)]
-        cells = [one for cell in every for one in ([cell] if isinstance(cell, int) else cell.needs)]
-        label, time = (own.get(role, [None])[0] for role in ("episode", "time"))
-        return Wanted(
-            tuple(dict.fromkeys(cells)),
-            label if isinstance(label, int) and cells.count(label) == 1 else None,
-            time if isinstance(time, int) else None,
-        )
-
-    def _read_plain(self, at: Sequence[int]) -> tuple[list[pa.Array], list[str], tuple[str, ...]] | None:
+    def _read_plain(
+        self, at: Sequence[int]
+    ) -> tuple[list[pa.Array], tuple[str, ...], tuple[str, ...]] | None:
         """Return columns of a plain text, what was guessed of them, and what was left out."""
         plain = self._plain()
         if plain is None:
@@ -276,10 +267,16 @@ class Text(OneFile):
         arrays = [
             plain.columns[cell]
             if isinstance(cell, int)
-            else cell.make(cells_of(cell, dict(plain.columns), names, self.file.shown, self.place), len(plain), ())
+            else cell.make(
+                cells_of(cell, dict(plain.columns), names, self.file.shown, self.place), len(plain), ()
+            )
             for cell in cells
         ]
-        return arrays, [guess for one in dict.fromkeys(needed) for guess in plain.guesses[one]], plain.notes
+        return (
+            arrays,
+            tuple(guess for one in dict.fromkeys(needed) for guess in plain.guesses[one]),
+            plain.notes,
+        )
 
 
 def _units(layout: Layout) -> tuple[str, ...]:

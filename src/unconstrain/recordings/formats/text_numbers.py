@@ -131,9 +131,7 @@ def _without_words(column: pa.Array, called: str, guesses: dict[str, None]) -> p
     return pc.if_else(words, pa.scalar(None, pa.string()), column)
 
 
-def without_sentinels(
-    column: pa.Array, numbers: pa.Array, called: str, guesses: dict[str, None]
-) -> pa.Array:
+def without_sentinels(column: pa.Array, numbers: pa.Array, called: str, guesses: dict[str, None]) -> pa.Array:
     """Return a column without a number such as -9999 that lies far from all others.
 
     Parameters

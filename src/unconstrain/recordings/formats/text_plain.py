@@ -5,7 +5,7 @@ cells turned out to be. Where anything is unusual nothing is returned, and the t
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,11 +16,13 @@ import pyarrow.csv
 
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
+from unconstrain.recordings.columns import Keys
 from unconstrain.recordings.files import File, named_errors
 from unconstrain.recordings.formats.text_encoding import BOM, INSTEAD, begin_text
 from unconstrain.recordings.formats.text_end import PIECE, Body, find_body
 from unconstrain.recordings.formats.text_lines import COMMENTS, Layout, is_number, join_header, split_line
 from unconstrain.recordings.formats.text_numbers import DATE, SENTINELS, cast, plain_text, without_sentinels
+from unconstrain.recordings.table import Header
 
 LABEL = pa.dictionary(pa.int32(), pa.string())
 """What labels of episodes are read as: most of them come again."""
@@ -74,6 +76,40 @@ class Plain:
     def n_bytes(self) -> int:
         """The size of the columns."""
         return sum(column.nbytes for column in self.columns.values())
+
+
+def find_wanted(header: Header, layout: Layout, asked: Mapping[str, Keys]) -> Wanted:
+    """Find the cells that will be read.
+
+    Parameters
+    ----------
+    header : Header
+        With a column for each of the layout's cells.
+    layout : Layout
+    asked : mapping of str to column, or list of columns
+        By the role they play; all are read where none are asked for.
+
+    Returns
+    -------
+    Wanted
+        Without cells where columns are asked for that are not there, which is said where they are looked for.
+    """
+    try:
+        roles = {role: header.find(role, keys) for role, keys in asked.items()}
+    except DataError:
+        return Wanted(())
+    keys = [(column.part_of or column.name, column.nth) for column in header.columns]
+    places = dict(zip(dict.fromkeys(keys), layout.cells, strict=True))
+    own = {role: [places[field.key] for field in fields] for role, fields in roles.items()}
+    made = [cell for cell in layout.cells if not isinstance(cell, int)]
+    every = [cell for cells in (own.values() if own else [layout.cells]) for cell in (*cells, *made)]
+    cells = [one for cell in every for one in ([cell] if isinstance(cell, int) else cell.needs)]
+    label, time = (own.get(role, [None])[0] for role in ("episode", "time"))
+    return Wanted(
+        tuple(dict.fromkeys(cells)),
+        label if isinstance(label, int) and cells.count(label) == 1 else None,
+        time if isinstance(time, int) else None,
+    )
 
 
 def read_plain(file: File, layout: Layout, wanted: Wanted) -> Plain | None:
@@ -230,7 +266,9 @@ def _may_hold_heading(table: Any, layout: Layout, kinds: dict[int, pa.DataType])
             continue  # comments were looked for, or would stand in the first column
         cells = [cell.strip() for cell in split_line(line.decode(), layout.delimiter)]
         names = {cell: cells[cell] for cell in kinds if cell < len(cells)}
-        if any(not is_number(name) and kinds[cell] not in (pa.string(), LABEL) for cell, name in names.items()):
+        if any(
+            not is_number(name) and kinds[cell] not in (pa.string(), LABEL) for cell, name in names.items()
+        ):
             continue
         if not names:
             return True

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from unconstrain.recordings.blocks import number_values
+from unconstrain.recordings.joined import join_cells, places
 from unconstrain.recordings.notes import Note
-from unconstrain.recordings.pieces import places
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
 from unconstrain.recordings.steps import comes_in_bursts
 from unconstrain.recordings.time import repeated
@@ -40,7 +40,7 @@ def _read_stamps(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     recording, pieces = portion.recording, portion.complete
     field = recording.roles.time
     assert field is not None
-    stamps = [piece.alike(field, "time") for piece in pieces]
+    stamps = join_cells(pieces, field, "time")
     if recording.saves and not recording.splits:
         return replace(rows, time=np.concatenate([part.numbers() for part in stamps])), ()
     clock, where = recording.clock, places(pieces)

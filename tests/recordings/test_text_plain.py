@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import unconstrain as uc
 from unconstrain.errors import DataError
-from unconstrain.recordings.episodewise import norms, percentile, step_norms
+from unconstrain.recordings.episodewise import median, norms, percentile, step_norms
 from unconstrain.recordings.files import File, locate
 from unconstrain.recordings.formats import kept, text
 from unconstrain.recordings.formats.text import Text
@@ -167,6 +167,7 @@ numbers = st.floats(-1e6, 1e6) | st.sampled_from([0.0, 1e-300, 1e150])
 def test_percentiles_are_those_of_numpy(values, percent):
     values = np.array(values)
     assert percentile(values, percent) == np.percentile(values, percent)
+    assert median(values) == np.median(values)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 8, 9, 17])

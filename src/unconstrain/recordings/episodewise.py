@@ -36,6 +36,25 @@ def percentile(values: NDArray[Any], percent: float) -> float:
     return b - (b - a) * (1 - share) if share >= 0.5 else a + (b - a) * share
 
 
+def median(values: NDArray[Any]) -> float:
+    """Return what `numpy.median` does.
+
+    Parameters
+    ----------
+    values : ndarray of shape (N,)
+        Finite, at least one.
+
+    Returns
+    -------
+    float
+    """
+    high = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, high)[high])
+    parted = np.partition(values, (high - 1, high))
+    return (float(parted[high - 1]) + float(parted[high])) / 2
+
+
 def norms(vectors: NDArray[Any]) -> NDArray[Any]:
     """Return what `numpy.linalg.norm` does of each row.
 

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.recordings.episodewise import median
+
 # Stamps come in bursts where more of the steps than this are longer than five median ones.
 BURSTS = 0.05
 LONG_STEPS = 5.0
@@ -36,7 +38,7 @@ def typical_step(steps: NDArray[Any], second: float = 1.0) -> float:
     if not len(going):
         return 0.0
     if not comes_in_bursts(going, second):
-        return float(np.median(going))
+        return median(going)
     return float(np.mean(going[going <= LONG_STEPS * np.percentile(going, 95)]))
 
 
@@ -44,11 +46,18 @@ def comes_in_bursts(steps: NDArray[Any], second: float = 1.0) -> bool:
     """Whether most steps (M,) are much shorter than what passes between samples; a `second` is in their unit."""
     if len(steps) < 2:
         return False
-    least = steps.min()
-    if least > 0 and steps.max() <= LONG_STEPS * least:
-        return False  # whatever their median is
-    long = steps[steps > LONG_STEPS * np.median(steps)]
+    if are_even(steps):
+        return False
+    long = steps[steps > LONG_STEPS * median(steps)]
     return len(long) > BURSTS * len(steps) and bool(np.median(long) <= BETWEEN * second)
+
+
+def are_even(steps: NDArray[Any]) -> bool:
+    """Whether no step (M,) is longer than `LONG_STEPS` times another, nor than any median of some of them."""
+    if not len(steps):
+        return True
+    least = steps.min()
+    return bool(least > 0 and steps.max() <= LONG_STEPS * least)
 
 
 def order_of(codes: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.preparation import TIME_UNITS
-from unconstrain.recordings.steps import order_of, typical_step
+from unconstrain.recordings.steps import comes_in_bursts, order_of, typical_step
 from unconstrain.recordings.table import Cells, is_text
 
 Codes = NDArray[np.int64]
@@ -90,9 +90,12 @@ class Clock:
         if rate is not None and own is None:
             return cls("frames", text, typical_step(steps, rate) / rate, rate)
         first = float(abs(ticks[0])) if len(ticks) else 0.0
-        guess, guessed = _guess(first, typical_step(steps, math.inf))
+        usual = typical_step(steps, math.inf)
+        guess, guessed = _guess(first, usual)
         found = own or unit or guess
-        typical = typical_step(steps, TIME_UNITS[found])
+        # What comes in no bursts however long a second is, does so in no unit.
+        bursts = comes_in_bursts(steps[steps > 0], math.inf)
+        typical = typical_step(steps, TIME_UNITS[found]) if bursts else usual
         if own is unit is None:  # what seemed bursts may have been gaps
             found, guessed = _guess(first, typical)
         guessed = guessed and own is unit is None

@@ -239,8 +239,10 @@ class Text(OneFile):
         """Return the columns that are wanted as Arrow reads them, where the text is plain."""
         if self._is_unusual:
             return None
-        plain = kept.find(self)
-        if plain is None and self._may_be_plain:
+        plain: Plain | None = kept.find(self)
+        if plain is not None:
+            return plain
+        if self._may_be_plain:
             layout = self._begun
             plain = read_plain(
                 self.file, layout, find_wanted(self._header(layout, {}), layout, self.wanted.read)

@@ -31,7 +31,8 @@ def percentile(values: NDArray[Any], percent: float) -> float:
     at = (len(values) - 1) * (percent / 100)
     low = math.floor(at)
     high = min(low + 1, len(values) - 1)
-    parted = np.partition(values, (low, high))
+    parted = values.copy()
+    parted.partition((low, high))
     a, b, share = float(parted[low]), float(parted[high]), at - low
     return b - (b - a) * (1 - share) if share >= 0.5 else a + (b - a) * share
 

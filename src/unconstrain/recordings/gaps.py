@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from unconstrain.recordings.episodewise import percentile, step_norms
-from unconstrain.recordings.steps import order_of, typical_step
+from unconstrain.recordings.steps import follow_each_other, typical_step
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -83,11 +83,13 @@ def split(
     -------
     Fragments
     """
-    order = order_of(episodes)
-    follow = bool(np.all(order[1:] > order[:-1]))
-    X, t, e = (states, time, episodes) if follow else (states[order], time[order], episodes[order])
+    X, t, e = states, time, episodes
+    follow = follow_each_other(episodes)
+    if not follow:
+        order = np.argsort(episodes, kind="stable")
+        X, t, e = states[order], time[order], episodes[order]
     own = _runs(e)
-    within = np.diff(e) == 0
+    within = e[1:] == e[:-1]
     steps = np.diff(t)
     with np.errstate(divide="ignore", invalid="ignore"):  # steps between episodes, masked below
         speeds = step_norms(X) / steps
@@ -96,8 +98,9 @@ def split(
         for code, one in enumerate(own):
             if one.stop - one.start > 1:
                 longest[code] = GAP_STEPS * typical_step(steps[one.start : one.stop - 1])
-    gaps = within & (steps > longest[e[1:]])
-    fast = within & ~gaps & (speeds > (np.inf if max_speed is None else max_speed))
+    never = np.zeros(len(steps), dtype=bool)
+    gaps = within & (steps > longest[e[1:]]) if np.isfinite(longest).any() else never
+    fast = never if max_speed is None else within & ~gaps & (speeds > max_speed)
     unbroken = within & ~gaps & ~fast
 
     fragment = np.concatenate([[0], np.cumsum(~unbroken)])

@@ -60,15 +60,13 @@ def are_even(steps: NDArray[Any]) -> bool:
     return bool(least > 0 and steps.max() <= LONG_STEPS * least)
 
 
-def order_of(codes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the order (N,) of samples episode by episode, where `codes` (N,) number the episodes."""
-    if np.all(codes[1:] >= codes[:-1]):
-        return np.arange(len(codes))
-    return np.argsort(codes, kind="stable")
+def follow_each_other(codes: NDArray[np.int64]) -> bool:
+    """Whether the samples of each episode follow each other, in the order of `codes` (N,), which number them."""
+    return bool(np.all(codes[1:] >= codes[:-1]))
 
 
 def runs(codes: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Return the samples of each episode, in order, where `codes` (N,) number the episodes from 0."""
-    order = order_of(codes)
+    order = np.arange(len(codes)) if follow_each_other(codes) else np.argsort(codes, kind="stable")
     bounds = [0, *np.cumsum(np.bincount(codes)).tolist()]
     return [order[a:b] for a, b in pairwise(bounds) if b > a]

@@ -74,8 +74,9 @@ def find_body(opened: Any, head: bytes, bom: int, layout: Layout) -> Body | None
     entries = [*first, *last]
     leave_out_end(tail, entries, layout, [])
     left = len(first) + len(last) - len(entries)
-    if not left:
-        return Body(start, size, [line for _, line in first], ())
+    if not left:  # comments may stand behind the samples
+        stop = min(at + sum(len(line) + 1 for line in lines[: last[-1][0]]), size)
+        return Body(start, stop, [line for _, line in first], ())
     if b"\r" in tail.replace(b"\r\n", b"\n"):
         return None
     before = layout.skipped + _count_lines(opened, start, at)

@@ -5,7 +5,7 @@ cells turned out to be. Where anything is unusual nothing is returned, and the t
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,9 @@ LABEL = pa.dictionary(pa.int32(), pa.string())
 """What labels of episodes are read as: most of them come again."""
 
 WHOLE = re.compile(r"\s*[+-]?\d+\s*")
+
+SPACES = (b"  ", b" \n", b"\n ", b" \r", b"\r ", b"\t", b"\v", b"\f", b"\x1c", b"\x1d", b"\x1e", b"\x1f")
+"""What is not one space between two cells, where spaces separate these."""
 
 COMMENT = re.compile(rb"[\r\n][ \t]*(?:#|%|//)")
 
@@ -178,11 +181,10 @@ def _read(
     texts = [cell for cell, kind in kinds.items() if kind == pa.string()]
     has_quotes = False
     if texts or len(kinds) < layout.width:
-        if layout.delimiter == " ":
-            return None  # of what stands between spaces nothing is known
         # A number or a label at the beginning of each line leaves no room for comments.
         may_be_comment = kinds.get(0, pa.string()) == pa.string()
-        seen = _look_through(opened, body, may_be_comment=may_be_comment)
+        unusual = (*(COMMENTS if may_be_comment else ()), *(SPACES if layout.delimiter == " " else ()))
+        seen = _look_through(opened, body, unusual)
         if seen is None:
             return None
         has_quotes = seen
@@ -219,14 +221,14 @@ def _read(
     return Plain(columns, guesses, body.notes)
 
 
-def _look_through(opened: Any, body: Body, *, may_be_comment: bool) -> bool | None:
+def _look_through(opened: Any, body: Body, unusual: Sequence[bytes]) -> bool | None:
     """Return whether there are quotes in a text; None where there is more that needs a look at each line."""
     has_quotes = False
     for at in range(body.start, body.stop, PIECE):
-        piece = opened.read_at(min(PIECE + 1, body.stop - at), at)  # two slashes may lie in two pieces
+        piece = opened.read_at(min(PIECE + 1, body.stop - at), at)  # two characters may lie in two pieces
         if not piece.isascii() or b"\0" in piece:
             return None
-        if may_be_comment and any(mark in piece for mark in COMMENTS):
+        if any(mark in piece for mark in unusual):
             return None
         has_quotes = has_quotes or b'"' in piece
     return has_quotes

@@ -6,8 +6,11 @@ same file without them, where it does. All in processor time of all threads, in 
 machine does counts less then. `LOAD_MEGABYTES=1000 python -m benchmarks load-csv` measures a text of a gigabyte.
 """
 
+import json
 import os
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from functools import cache
@@ -18,6 +21,7 @@ import numpy as np
 
 import unconstrain as uc
 from benchmarks.ratio import Ratio
+from benchmarks.stream import peak
 
 MEGABYTES = float(os.environ.get("LOAD_MEGABYTES", "100"))
 """Of text."""
@@ -41,7 +45,7 @@ def csv() -> Ratio:
         "load-csv",
         f"uc.load of a CSV of {path.stat().st_size / 1e6:.0f} MB, velocities recorded",
         "pyarrow.csv.read_csv of these columns",
-        lambda: uc.load(path, state=STATE, action=ACTION, time="t", episode="run"),
+        lambda: _load(path),
         lambda: pyarrow.csv.read_csv(path, convert_options=columns),
         1.3,
     )
@@ -60,6 +64,26 @@ def csv_positions() -> Ratio:
         lambda: uc.load(path, state=STATE, time="t", episode="run"),
         lambda: pyarrow.csv.read_csv(path, convert_options=columns),
         1.3,
+    )
+
+
+def csv_memory() -> Ratio:
+    """Peak memory of loading the text, beside its columns in double precision; in a process of its own."""
+    path = _csv()
+    command = [sys.executable, "-m", "benchmarks.loading", str(path)]
+    done = subprocess.run(
+        command, cwd=Path(__file__).parents[1], stdout=subprocess.PIPE, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    columns = 8.0 * found["samples"] * (len(STATE) + len(ACTION) + 2)
+    return Ratio(
+        "load-csv-memory",
+        f"uc.load of a CSV of {path.stat().st_size / 1e6:.0f} MB: most memory taken",
+        "its columns in double precision",
+        found["taken"] / columns,
+        3.0,
+        found["seconds"],
+        0.0,
     )
 
 
@@ -192,7 +216,23 @@ def _shelf() -> Path:
 BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "load-csv": csv,
     "load-csv-positions": csv_positions,
+    "load-csv-memory": csv_memory,
     "load-hdf5": hdf5,
     "load-matlab": matlab,
     "load-mcap": mcap,
 }
+
+
+def _load(path: str | Path) -> uc.Demonstrations:
+    return uc.load(path, state=STATE, action=ACTION, time="t", episode="run")
+
+
+if __name__ == "__main__":
+    with TemporaryDirectory() as folder, open(sys.argv[1], "rb") as text:
+        beginning = Path(folder) / "beginning.csv"
+        beginning.write_bytes(text.read(1_000_000).rpartition(b"\n")[0] + b"\n")
+        _load(beginning)  # with all libraries that it takes
+    before, start = peak(), time.process_time()
+    loaded = _load(sys.argv[1])
+    spent = time.process_time() - start
+    print(json.dumps({"taken": peak() - before, "samples": len(loaded), "seconds": spent}))

@@ -218,6 +218,9 @@ def _read(
         elif not _are_plain_numbers(column, called):
             return None
         columns[cell], guesses[cell] = column, tuple(own)
+    # The blocks that were parsed are gone, but Arrow would keep their memory for others.
+    del column, table
+    pa.default_memory_pool().release_unused()
     return Plain(columns, guesses, body.notes)
 
 

@@ -31,8 +31,9 @@ from unconstrain.recordings.formats.text_layout import PROBED, find_layout
 from unconstrain.recordings.formats.text_lines import Layout, content, join_header, lines_of
 from unconstrain.recordings.formats.text_made import Part, cells_of
 from unconstrain.recordings.formats.text_parsing import parse
-from unconstrain.recordings.formats.text_plain import Plain, find_wanted, read_plain
+from unconstrain.recordings.formats.text_plain import Plain, read_plain
 from unconstrain.recordings.formats.text_rows import Rows, begins_anew, find_rows
+from unconstrain.recordings.formats.text_wanted import find_wanted
 from unconstrain.recordings.table import Column, Header
 from unconstrain.recordings.units import said_of_units, unit_in
 

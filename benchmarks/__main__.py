@@ -6,6 +6,7 @@ python -m benchmarks models               which kind of policy for which data: e
 python -m benchmarks rivals               our policies beside GMR, LPV-DS, DMP and behaviour cloning, simulated
 python -m benchmarks rivals-handwriting   the same and SEDS on handwriting; needs --data=FOLDER
 python -m benchmarks rivals-wiping        those without a goal on wiping; needs --data=FOLDER
+python -m benchmarks wider                100,000 parameters on 200,000 samples, the better part of an hour
 python -m benchmarks --out FILE           where the JSON goes (default out/benchmarks.json)
 """
 
@@ -24,7 +25,20 @@ from rich.progress import track
 from rich.table import Table
 
 import unconstrain as uc
-from benchmarks import fits, identifiability, loading, models, start, step, stream, viewer
+from benchmarks import (
+    fits,
+    identifiability,
+    latency,
+    loading,
+    models,
+    predict,
+    start,
+    step,
+    stream,
+    viewer,
+    warm,
+    wide,
+)
 from benchmarks.ratio import Ratio
 from benchmarks.rivals import handwriting, simulated, wiping
 from unconstrain.errors import UnconstrainError
@@ -34,6 +48,9 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "adaptive-fit": fits.adaptive_fit,
     "parametric-fit": fits.parametric_fit,
     "wide-fit": fits.wide_fit,
+    "iterative-fit": wide.fit,
+    "iterative-memory": wide.memory,
+    "iterative-path": wide.path,
     "lambda-path": fits.lambda_path,
     "lambda-path-local": fits.lambda_path_local,
     "loop": fits.loop,
@@ -46,13 +63,17 @@ BENCHMARKS: dict[str, Callable[[], Ratio]] = {
     "stream-linear-memory": stream.linear_memory,
     "stream-local-memory": stream.local_memory,
     **loading.BENCHMARKS,
+    **warm.BENCHMARKS,
     **step.BENCHMARKS,
+    **latency.BENCHMARKS,
+    **predict.BENCHMARKS,
     **start.BENCHMARKS,
     **viewer.BENCHMARKS,
 }
 
 TABLES: dict[str, Callable[[Path | None], None]] = {
     "models": lambda _: models.print_tables(),
+    "wider": lambda _: wide.wider(),
     "rivals": lambda _: simulated.print_tables(),
     "rivals-handwriting": handwriting.print_table,
     "rivals-wiping": wiping.print_table,

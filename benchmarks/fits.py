@@ -17,7 +17,7 @@ def _data(n_samples: int, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
     return X, Pi - a * np.sum(a * Pi, axis=1, keepdims=True)
 
 
-def _half_free(n_samples: int, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def draw_half_free(n_samples: int, n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States, noisy actions and episodes of movements, half of which nothing is in the way of."""
     rng = np.random.default_rng(seed)
     episodes = n_samples // 100
@@ -107,7 +107,7 @@ def lambda_path_local() -> Ratio:
 
 def adaptive_fit() -> Ratio:
     """Inference of contact with all its starts, beside one fit by inconsistency, both with λ chosen."""
-    X, U, groups = _half_free(10_000, 7)
+    X, U, groups = draw_half_free(10_000, 7)
     ours, one = medians(
         lambda: uc.LocallyLinearPolicy(n_centers=50).fit(X, U, groups=groups),
         lambda: uc.LocallyLinearPolicy(n_centers=50, risk="inconsistency").fit(X, U, groups=groups),

@@ -69,9 +69,17 @@ def _local():
     return "50 local models, n=d=7", uc.LocallyLinearPolicy(n_centers=50, alpha=1e-6, risk="inconsistency"), 7
 
 
-def _ratio(name: str, work: str, policy, n: int, reach: float, ready: Callable) -> Ratio:
+KINDS = {"linear": _linear, "rbf": _rbf, "local": _local}
+"""What is evaluated: its name, the policy, and the dimension of its states."""
+
+
+def draw_samples(n: int) -> tuple[np.ndarray, np.ndarray]:
     X = np.random.default_rng(0).uniform(-1.5, 1.5, size=(5000, n))
-    U = -np.sign(X) * np.abs(X) ** 0.5
+    return X, -np.sign(X) * np.abs(X) ** 0.5
+
+
+def _ratio(name: str, work: str, policy, n: int, reach: float, ready: Callable) -> Ratio:
+    X, U = draw_samples(n)
     policy.fit(X, U)
     ridge, sample = Ridge().fit(X, U), X[:1].copy()
     step, against = Timer(ready(policy, X[0].copy())), Timer(lambda: ridge.predict(sample))

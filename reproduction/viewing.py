@@ -12,6 +12,9 @@ from unconstrain.cli.command import Command, Group
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from reproduction.grasp.page import GraspPage
+    from unconstrain.viewer.page import Page
+
 HOST, PORT = "127.0.0.1", 8080
 """Those of `unconstrain.viewer.server`, which is not imported before it is needed."""
 
@@ -96,8 +99,7 @@ def grasp(
         page = GraspPage(demonstrator, policies | {"true policy": demonstrator.policy}, host=host, port=port)
     for note in page.robot.notes:
         console.print(f"note: {note}", soft_wrap=True)
-    _say_where(console, page.url, host)
-    page.wait()
+    _serve(console, page, host)
 
 
 @view.command("cycle", cls=Command)
@@ -135,8 +137,15 @@ def cycle(movements: int, risk: str, port: int, host: str) -> None:
     page.put_in_the_way(PLANE)
     for note in page.notes:
         console.print(f"note: {note}", soft_wrap=True)
-    _say_where(console, page.url, host)
-    page.wait()
+    _serve(console, page, host)
+
+
+def _serve(console: "Console", page: "GraspPage | Page", host: str) -> None:
+    try:
+        _say_where(console, page.url, host)
+        page.wait()
+    except KeyboardInterrupt:  # before it waits for one
+        page.close()
 
 
 def _say_where(console: "Console", url: str, host: str) -> None:

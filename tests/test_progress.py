@@ -33,6 +33,7 @@ def test_what_goes_on_is_shown_on_terminals_only(monkeypatch, terminal):
     stream.isatty = lambda: terminal
     monkeypatch.setattr("sys.stderr", stream)
     monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("unconstrain.waiting.DELAY", 0.0)
     with working("reading [bold]x") as tell:
         tell("fitting [/b]y")
     assert ("fitting [/b]y" in stream.getvalue()) == terminal

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unconstrain.receptive import activations, normalized_activations
+from unconstrain.receptive import activations, blend, normalized_activations
 
 X, C = np.random.default_rng(0).normal(size=(20, 3)), np.random.default_rng(1).normal(size=(5, 3))
 
@@ -50,3 +50,16 @@ def test_near_and_far_say_the_same_where_they_meet():
     np.testing.assert_allclose(near, far, rtol=0.2)
     exact = np.exp(30.5 * direction @ (0.1 * C).T - 0.5 * np.sum((0.1 * C) ** 2, axis=1))
     np.testing.assert_allclose(far, exact / exact.sum(), rtol=1e-10)
+
+
+@pytest.mark.parametrize("width", [0.7, np.array([0.4, 2.0, 1.0]), 0.02])
+@pytest.mark.parametrize("far", [0.0, 300.0])
+def test_a_blend_is_that_of_the_normalised_activations(width, far):
+    rng = np.random.default_rng(0)
+    X, centers = 1e3 + rng.uniform(-1, 1, (5000, 3)), 1e3 + rng.uniform(-1, 1, (12, 3))
+    X[2500, 0] += far  # one state alone, far from all centres
+    rows = rng.normal(size=(12, 2))
+    expected = normalized_activations(X, centers, width) @ rows
+    found = np.concatenate([(sums / total).T for _, sums, total in blend(X, centers, width, rows)])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=3e-13 / np.min(width) ** 2)
+    assert len(list(blend(X[:0], centers, width, rows))) == 0

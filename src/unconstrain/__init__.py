@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from unconstrain.scaling.stream import fit_stream
     from unconstrain.selection import select_policy
     from unconstrain.viewer import view
+    from unconstrain.waiting import verbose
 
     __version__: str
 
@@ -98,6 +99,7 @@ __all__ = [
     "select_policy",
     "spaces",
     "torch",
+    "verbose",
     "view",
     "viewer",
 ]
@@ -137,6 +139,7 @@ _HOMES = {
     "unconstrain.selection": ("select_policy",),
     "unconstrain.version": ("__version__",),
     "unconstrain.viewer": ("view",),
+    "unconstrain.waiting": ("verbose",),
 }
 
 _NAMESPACES = {

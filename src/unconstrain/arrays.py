@@ -162,8 +162,9 @@ def check_states(estimator: "BaseEstimator", X: ArrayLike, *, reset: bool = Fals
     expected = None if reset else getattr(estimator, "n_features_in_", None)
     with _one_sentence(lambda: _hint_at_states(X, expected)):
         states = validate_data(estimator, unmask(X), reset=reset, dtype=np.float64, ensure_all_finite=False)
-    check_finite(states, "X")
-    _check_not_too_large("the states X", states)
+    if not _largest(states) <= SQUARABLE:
+        check_finite(states, "X")
+        _check_not_too_large("the states X", states)
     return states
 
 
@@ -622,8 +623,9 @@ def _check_not_too_large(names: str, array: np.ndarray) -> None:
 
 
 def _largest(array: np.ndarray) -> float:
-    # Without the copy that the absolute values would be.
-    return max(float(array.max(initial=0.0)), -float(array.min(initial=0.0)))
+    # Without the copy that the absolute values would be. NaN where a number is NaN.
+    high, low = float(array.max(initial=0.0)), float(array.min(initial=0.0))
+    return np.nan if np.isnan(high) else max(high, -low)
 
 
 def _hint_at_samples(X: ArrayLike, y: ArrayLike) -> str:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from unconstrain import atomic, storage
 from unconstrain.errors import DataError
+from unconstrain.waiting import stage
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -38,7 +39,7 @@ def write(demos: "Demonstrations", path: str | os.PathLike[str]) -> None:
         return
     import pyarrow.parquet as pq
 
-    with atomic.replacing(path) as temporary:
+    with stage("writing"), atomic.replacing(path) as temporary:
         pq.write_table(_table(demos), temporary, write_page_checksum=True)
 
 

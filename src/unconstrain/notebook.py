@@ -79,10 +79,14 @@ class NotebookBar:
         self._begun: tuple[float, int] | None = None
         self._updated = 0.0
 
-    def begin(self, text: str) -> None:
-        """Say what is done from now on."""
-        self._text, self._begun = text, None
+    def begin(self, text: str, unit: str | None = None) -> None:
+        """Say what is done from now on, and what is counted, where that is something else."""
+        self._text, self._begun, self._unit = text, None, self._unit if unit is None else unit
         self._show(f"<progress></progress> {html.escape(text)}")
+
+    def clear(self) -> None:
+        """Show nothing any more."""
+        self._show("")
 
     def __call__(self, done: int, total: int | None) -> None:
         """Show what is done, and what there is in all."""

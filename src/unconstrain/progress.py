@@ -1,11 +1,11 @@
 """Show how far work has come, on standard error, so that results on standard output stay clean."""
 
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from unconstrain.notebook import NotebookBar, is_notebook
+from unconstrain.waiting import is_shown, stage, verbose
 
 Report = Callable[[int, int | None], None]
 """Called with what is done and what there is in all, None where that is not known.
@@ -37,7 +37,7 @@ def reporting(progress: bool | Report | None, unit: str = "rows") -> Iterator[Re
     ----------
     progress : bool, function or None
         True shows a bar, with rate and time left, in a notebook below the cell; a function is itself called; False and
-        None show nothing.
+        None show nothing but to whoever has asked for all that takes long (`waiting.verbose`).
     unit : str
         What is counted.
 
@@ -49,8 +49,9 @@ def reporting(progress: bool | Report | None, unit: str = "rows") -> Iterator[Re
     if callable(progress):
         yield progress
         return
-    if not progress:
-        yield lambda done, total: None
+    if not progress or is_shown():
+        with stage("learning", unit=unit) as shown:  # whoever asked for all that takes long sees this too
+            yield shown
         return
     if is_notebook():  # where rich shows nothing without a package that few have
         yield NotebookBar(unit)
@@ -93,7 +94,7 @@ class _Bar:
 
 @contextmanager
 def working(text: str) -> Iterator[Callable[[str], None]]:
-    """Show that something goes on, where standard error is a terminal.
+    """Show what goes on, where that takes longer than a second and standard error is a terminal.
 
     Parameters
     ----------
@@ -105,11 +106,5 @@ def working(text: str) -> Iterator[Callable[[str], None]]:
     function
         To be called with another text, once something else goes on.
     """
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    from rich.console import Console
-    from rich.text import Text
-
-    with Console(stderr=True).status(Text(text)) as status:
-        yield lambda text: status.update(Text(text))
+    with verbose(), stage(text) as shown:
+        yield shown.begin

@@ -4,10 +4,16 @@
 which each is then divided before distances are taken.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 FAR = 460.0
 """Where the nearest centre's exponent is below minus this, its activation is less than 1e-200."""
+NEAR = 64.0
+"""Up to so many squared widths from the centres' mean, a distance is the difference of products to 1e-14 of a squared
+width, and no activation underflows."""
+BLOCK_STATES = 2048
 NARROWEST, WIDEST = 1e-150, 1e150
 """Widths whose square is a number in double precision."""
 
@@ -84,6 +90,68 @@ def normalized_activations(X: np.ndarray, centers: np.ndarray, width: float | np
     np.exp(exponent, out=exponent)
     exponent /= exponent.sum(axis=1, keepdims=True)
     return exponent
+
+
+def blend(
+    X: np.ndarray, centers: np.ndarray, width: float | np.ndarray, rows: np.ndarray
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    """Blend rows of numbers, one for each centre, by how much states activate the centres.
+
+    That is `normalized_activations(X, centers, width) @ rows`, but in blocks of states that stay in the processor's
+    cache, with distances by a matrix product as long as that rounds no more than the exponential does.
+
+    Parameters
+    ----------
+    X : ndarray of shape (N, n)
+        States.
+    centers : ndarray of shape (M, n)
+        Centres.
+    width : float or ndarray of shape (n,)
+        σ, in the unit of the states.
+    rows : ndarray of shape (M, k)
+        What is blended.
+
+    Yields
+    ------
+    block : slice
+        Of B states.
+    sums : ndarray of shape (k, B)
+        Sums over the centres, a column for each state; overwritten by the next block.
+    total : ndarray of shape (B,)
+        By which they are still to be divided.
+    """
+    mean = centers.mean(axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        away = (centers - mean) / width
+        squares = np.einsum("mn,mn->m", away, away)
+    (M, n), k = away.shape, rows.shape[1]
+    near = bool(squares.max() <= NEAR)
+    # Of one exponent: x·c, and the squares of both, whose other factor is one.
+    products = np.column_stack([away, -0.5 * squares, np.full(M, -0.5)])
+    weights = np.column_stack([rows, np.ones(M)]).T.copy()
+    size = min(len(X), BLOCK_STATES)
+    states, square, exponents, sums = (np.empty((count, size)) for count in (n + 2, n, M, k + 1))
+    states[n] = 1.0
+    for start in range(0, len(X), BLOCK_STATES):
+        x = X[start : start + BLOCK_STATES]
+        block, B = slice(start, start + len(x)), len(x)
+        if size > B:
+            states, square, exponents, sums = (
+                part[:, :B].copy() for part in (states, square, exponents, sums)
+            )
+            size = B
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.subtract(x.T, mean[:, None], out=states[:n])
+            states[:n] /= np.reshape(width, (-1, 1))
+            np.multiply(states[:n], states[:n], out=square)
+            square.sum(axis=0, out=states[n + 1])
+        if near and states[n + 1].max() <= NEAR:
+            np.matmul(products, states, out=exponents)
+            np.exp(exponents, out=exponents)
+            np.matmul(weights, exponents, out=sums)
+            yield block, sums[:k], sums[k]
+        else:
+            yield block, (normalized_activations(x, centers, width) @ rows).T, np.ones(B)
 
 
 def _in_one_unit(

@@ -59,6 +59,7 @@ from unconstrain.policies.locally_linear import LocallyLinearPolicy
 from unconstrain.policies.parametric import ParametricPolicy
 from unconstrain.samples import Samples
 from unconstrain.spaces import Space
+from unconstrain.waiting import each, stage
 
 # What a default candidate may have: a cross-validated fit then takes seconds to solve, whatever the dimension.
 MOST_PARAMETERS = 1000
@@ -322,12 +323,14 @@ def select_policy(
     fitting = parallel(
         joblib.delayed(_try)(name, policy, X, U, groups, projections) for name, policy in named.items()
     )
-    for row, found in fitting:
-        rows.append(row)
-        if found is not None:
-            held_out[row.name] = found
-        if progress is not None:
-            progress(row)
+    with stage("fitting policies", len(named), "fitted") as report:
+        for row, found in fitting:
+            rows.append(row)
+            report(len(rows), len(named))
+            if found is not None:
+                held_out[row.name] = found
+            if progress is not None:
+                progress(row)
     problems = [row.problem for row in rows]
     if not held_out:
         if len(set(problems)) == 1:
@@ -509,7 +512,7 @@ def _hold_out(
     is_inferred = policy.risk == "adaptive"
     free = np.empty(len(X)) if is_inferred else None
     present = [k for k, part in enumerate(accumulator.total.moments) if part is not None]
-    for k in np.unique(fold).tolist():
+    for k in each(np.unique(fold).tolist(), "predicting each fold", unit="folds"):
         if policy.alpha == "cv" and len(present) - (k in present) < 2:
             # One fold is left, and λ is chosen within it.
             train = fold != k
@@ -547,7 +550,7 @@ def _hold_out_by_refitting(
     fold = EpisodeFolds().assign(groups, len(X))
     actions = check_actions(U)
     predictions = np.empty_like(actions)
-    for k in np.unique(fold).tolist():
+    for k in each(np.unique(fold).tolist(), "fitting without each fold", unit="folds"):
         rest = fold != k
         left = clone(policy).fit(
             X[rest],

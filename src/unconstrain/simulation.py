@@ -27,6 +27,7 @@ from unconstrain.stopping import (
     check_inside,
     describe_stop,
 )
+from unconstrain.waiting import each, stage
 
 Array = NDArray[np.float64]
 
@@ -152,6 +153,7 @@ def rollout(
     return simulate(policy, start, steps, dt, project=project, stop_when=stop_when, guards=guards)
 
 
+@stage("rolling out")
 def simulate(
     policy: Policy,
     start: ArrayLike,
@@ -235,7 +237,7 @@ def simulate(
 
     # A policy may overflow on its way out of all bounds; the sentence of its stop says so better than a warning.
     with np.errstate(over="ignore", invalid="ignore"):
-        for k in range(samples):
+        for k in each(range(samples), "rolling out", unit="steps"):
             wanted = _actions(predict, x)
             N = None if project is None else project(k, x, wanted)
             if N is None:

@@ -1,7 +1,9 @@
 import copy
 import json
 import pickle
+import sys
 import threading
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -362,3 +364,25 @@ def test_mistakes_are_told_in_one_sentence(call, sentence):
     with pytest.raises(uc.errors.PolicyError, match=sentence) as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["linear", "rbf", "local"])
+def test_a_step_allocates_nothing(name):
+    step, x, out = STEPS[name], X[0].copy(), np.empty(3)
+
+    def run():
+        for _ in range(1000):
+            step(x, out)
+
+    run()
+    blocks = sys.getallocatedblocks()
+    run()
+    assert sys.getallocatedblocks() - blocks < 10  # of a thousand steps
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        run()
+        # Names and numbers of the one call that runs; a single array of any size, with what holds it, is more.
+        assert tracemalloc.get_traced_memory()[1] - before < 1000
+    finally:
+        tracemalloc.stop()

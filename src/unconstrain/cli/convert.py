@@ -61,10 +61,12 @@ def convert(recorded: recordings.Recorded, out: Path, fps: float | None, overwri
         demos = recorded.load()
     recordings.describe(demos)
     if is_file:
-        demos.save(out)
+        with working("writing"):
+            demos.save(out)
         reporting.say(f"written: {out}")
     else:
-        written = lerobot_dataset.write_lerobot(demos, out, fps=fps, overwrite=overwrite)
+        with working("writing"):
+            written = lerobot_dataset.write_lerobot(demos, out, fps=fps, overwrite=overwrite)
         told = f"{len(written)} samples, {written.n_episodes} episode{'' if written.n_episodes == 1 else 's'}"
         reporting.say(f"written: {out}, a LeRobot dataset of {told}")
     reporting.say(f"\nnext:\n  unconstrain fit {reporting.shell_word(out)}")

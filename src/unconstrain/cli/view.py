@@ -129,8 +129,11 @@ def view(
         )
     for note in page.notes:
         reporting.say(f"note: {in_words_of_program(note)}")
-    _say_where(page, host)
-    page.wait()
+    try:
+        _say_where(page, host)
+        page.wait()
+    except KeyboardInterrupt:  # before it waits for one
+        page.close()
 
 
 def _check_rerun(

@@ -40,6 +40,7 @@ from unconstrain.fitting.observation import observe
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.parallel import cut_blocks
 from unconstrain.policies.linear import LinearPolicy
+from unconstrain.waiting import each, stage
 
 CRITERIA = ("A", "D")
 
@@ -120,6 +121,7 @@ class Planner:
         shares = np.divide(1.0, reach, out=np.zeros_like(reach), where=reach > np.finfo(np.float64).tiny)
         self._G = _stack(policy.model_.moments(candidates, everything, shares).H)
 
+    @stage("choosing what to record next")
     def choose(self, k: int, criterion: str = "A") -> list[PlannedRecording]:
         """Choose the k best recordings one after the other, and take them into the posterior.
 
@@ -138,7 +140,7 @@ class Planner:
         X, q = self._propose()
         movements = self.foresight.follow(X, q, self.length)
         chosen = []
-        for _ in range(k):
+        for _ in each(range(k), "choosing what to record next", unit="recordings"):
             best = int(np.argmax(self.gains_of(movements, criterion)))
             one = slice(best, best + 1)
             covariance = self.policy.covariance(X[one], self.posteriors[0])[0]
@@ -184,7 +186,8 @@ class Planner:
             As for `gains`.
         """
         total = np.zeros(len(movements))
-        for rows in cut_blocks(len(movements), MOVEMENTS_IN_BLOCK):
+        blocks = cut_blocks(len(movements), MOVEMENTS_IN_BLOCK)
+        for rows in each(blocks, "weighing movements", unit="blocks"):
             V, weights = self._show(movements.select(rows))
             for posterior in self.posteriors:
                 for model in zip(*_parts(posterior), self._G, weights, strict=True):

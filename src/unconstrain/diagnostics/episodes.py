@@ -16,6 +16,7 @@ from unconstrain.diagnostics.spectrum import compute_directions, compute_shares
 from unconstrain.parallel import cut_blocks
 from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
+from unconstrain.waiting import each, stage
 
 NUMBERS_IN_BLOCK = 2**20
 
@@ -42,6 +43,7 @@ class Contribution:
     droppable: bool
 
 
+@stage("weighing episodes")
 def compute_contributions(
     policy: LinearPolicy, information: Information, samples: Samples, episodes: np.ndarray, threshold: float
 ) -> list[Contribution]:
@@ -118,7 +120,8 @@ def compute_leverages(
     X, observation = samples.states, policy.observe(samples)
     result = np.zeros(len(X))
     width = max(root.shape[1] for root in roots) + information.moments.H.shape[-1]
-    for rows in cut_blocks(len(X), max(64, NUMBERS_IN_BLOCK // width)):
+    blocks = cut_blocks(len(X), max(64, NUMBERS_IN_BLOCK // width))
+    for rows in each(blocks, "weighing episodes", unit="blocks"):
         part, reach = observation[rows], policy.model_.reach(X[rows])
         Q, counts = part.rows, part.row_weights
         for k in range(observation.n_rows):

@@ -25,10 +25,12 @@ from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import unpack_demonstrations
 from unconstrain.policies.linear import LinearPolicy
 from unconstrain.samples import Samples
+from unconstrain.waiting import stage
 
 BOTH_OR_NEITHER = "give states and actions both, or neither: identifiability(policy, X, U)"
 
 
+@stage("finding what is determined")
 def identifiability(
     policy: LinearPolicy,
     X: ArrayLike | Demonstrations | None = None,

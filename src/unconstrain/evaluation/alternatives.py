@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
+from unconstrain import waiting
 from unconstrain.demonstrations import Demonstrations
 from unconstrain.errors import UnconstrainError
 from unconstrain.evaluation.jumps import Jumps, find_jumps
@@ -95,7 +96,8 @@ def try_alternatives(
     views = []
     jumps = find_jumps(demos.actions) if demos.time is not None else None
     limit = "" if jumps is None else f"--max-speed {jumps.max_speed:g}"
-    for meaning, options, make in _list_views(demos, jumps, without):
+    ways = list(_list_views(demos, jumps, without))
+    for meaning, options, make in waiting.each(ways, "trying what may be missing", unit="ways"):
         if progress is not None:
             progress(f"trying {meaning}")
         try:
@@ -112,7 +114,7 @@ def try_alternatives(
     # Inferring contact takes long, and helps little where ordinary regression sees nothing better.
     promising = sorted(views, key=lambda each: each[0].explained)[-MOST_INFERRED:]
     tried = []
-    for each, model, view in views:
+    for each, model, view in waiting.each(views, "inferring contact with what may be missing", unit="ways"):
         if any(view is other for _, _, other in promising):
             inferred = _explain(model, policy.risk, view)
             each = replace(each, explained=max(each.explained, inferred or 0.0))

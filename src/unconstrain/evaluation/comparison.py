@@ -22,6 +22,7 @@ from unconstrain.fitting.inference import FREE
 from unconstrain.judging import Judge
 from unconstrain.policies.base import Policy
 from unconstrain.selection import Row, Table, select_policy
+from unconstrain.waiting import stage
 
 COMPARED = ("adaptive", "inconsistency", "direct")
 """Risks that every policy is compared with: what its samples show is inferred, none of them is free, or all are."""
@@ -115,6 +116,7 @@ def _is_surely_better(one: Row, other: Row) -> bool:
     return bool(gains.mean() > SURE * gains.std(ddof=1) / np.sqrt(len(gains)))
 
 
+@stage("comparing risks")
 def compare_risks(
     policy: Policy | None,
     X: ArrayLike | Demonstrations,
@@ -188,6 +190,7 @@ def _tell_regression(policies: dict[str, Policy]) -> None:
             )
 
 
+@stage("evaluating")
 def evaluate_held_out(
     compared: Comparison,
     demos: Demonstrations,

@@ -24,6 +24,7 @@ from unconstrain.notebook import format_sentences, format_table
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import as_demonstrations
 from unconstrain.selection import select_policy
+from unconstrain.waiting import stage
 
 if TYPE_CHECKING:
     import pandas
@@ -148,6 +149,7 @@ class Evaluation:
         return format_table(COLUMNS, self.rows()) + format_sentences(self.sentences())
 
 
+@stage("evaluating")
 def evaluate(
     policy: Policy,
     X: Demonstrations | ArrayLike,

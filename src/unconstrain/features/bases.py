@@ -93,6 +93,28 @@ class Compilable(Protocol):
 
 
 @runtime_checkable
+class Blending(Protocol):
+    """A basis that computes `W b(x)` faster than by way of `b(x)`."""
+
+    def blend(self, X: np.ndarray, W: np.ndarray) -> np.ndarray:
+        """Compute `W b(x)`.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+        W : ndarray of shape (d, M)
+            Weights of the basis functions, a row for each action.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            Actions.
+        """
+        ...
+
+
+@runtime_checkable
 class CompilableDescent(Protocol):
     """A basis of which `-∇ wᵀb(x)` can be compiled."""
 

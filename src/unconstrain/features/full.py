@@ -18,6 +18,7 @@ from unconstrain.deploy.compiled import CompiledPolicy, Linear
 from unconstrain.errors import PolicyError
 from unconstrain.features.base import Features, fit_transformer, is_feature_map
 from unconstrain.features.bases import (
+    Blending,
     Compilable,
     adapted,
     compilation_error,
@@ -25,6 +26,8 @@ from unconstrain.features.bases import (
     scaling_for,
 )
 from unconstrain.features.scaling import NO_SPREAD, Scaling
+
+BLOCK_ROWS = 4096
 
 
 class FullFeatures(BaseEstimator):
@@ -102,13 +105,7 @@ class FullFeatures(BaseEstimator):
             `b(x)`, in double precision.
         """
         if self.transformer_ is None:
-            # Stored a row a feature, as products are formed.
-            rows = np.empty((X.shape[1] + 1, len(X)))
-            mean, spread = self._standard
-            np.subtract(X.T, mean[:, None], out=rows[:-1])
-            rows[:-1] /= spread[:, None]
-            rows[-1] = 1.0
-            return rows.T
+            return self._standardized(X, np.empty((X.shape[1] + 1, len(X))))
         Z = X.astype(np.float64, copy=False) if self.scaling_ is None else self.scaling_(X)
         B = self.transformer_.transform(Z)
         return np.asarray(B.toarray() if hasattr(B, "toarray") else B, dtype=np.float64)
@@ -145,7 +142,17 @@ class FullFeatures(BaseEstimator):
         ndarray of shape (N, d)
             `π(x) = W b(x)`.
         """
-        return self.basis(X) @ w.reshape(self.n_actions_, -1).T
+        W = w.reshape(self.n_actions_, -1)
+        if self.transformer_ is not None:
+            if isinstance(self.transformer_, Blending) and self.scaling_ is None:
+                return self.transformer_.blend(X.astype(np.float64, copy=False), W)
+            return self.basis(X) @ W.T
+        # In blocks that stay in the processor's cache.
+        actions, rows = np.empty((len(X), len(W))), np.empty((X.shape[1] + 1, min(len(X), BLOCK_ROWS)))
+        for start in range(0, len(X), BLOCK_ROWS):
+            x = X[start : start + BLOCK_ROWS]
+            np.matmul(self._standardized(x, rows[:, : len(x)]), W.T, out=actions[start : start + len(x)])
+        return actions
 
     def decay_basis(self, second: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
         """Standardise linear features by their own moments, and name the intercept.
@@ -220,6 +227,14 @@ class FullFeatures(BaseEstimator):
         if not isinstance(basis, Compilable):
             raise compilation_error(self.transformer_)
         return basis.compile(w.reshape(self.n_actions_, -1))
+
+    def _standardized(self, X: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Return the linear features of states (N, n), stored a row a feature, as products are formed: (n + 1, N)."""
+        mean, spread = self._standard
+        np.subtract(X.T, mean[:, None], out=rows[:-1])
+        rows[:-1] /= spread[:, None]
+        rows[-1] = 1.0
+        return rows.T
 
     @property
     def _standard(self) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from unconstrain.arrays import check_states, check_weights
 from unconstrain.deploy.compiled import Potential, RadialBasis
 from unconstrain.features.centers import place_centers
-from unconstrain.receptive import normalized_activations
+from unconstrain.receptive import blend, normalized_activations
 from unconstrain.undo import undone_on_failure
 
 
@@ -121,6 +121,26 @@ class NormalizedRBF(TransformerMixin, BaseEstimator):
         """
         check_is_fitted(self)
         return normalized_activations(check_states(self, X), self.centers_, self.width_)
+
+    def blend(self, X: np.ndarray, W: np.ndarray) -> np.ndarray:
+        """Compute `W b(x)`, without the basis functions themselves.
+
+        Parameters
+        ----------
+        X : ndarray of shape (N, n)
+            States.
+        W : ndarray of shape (d, M)
+            Weights of the basis functions, a row for each action.
+
+        Returns
+        -------
+        ndarray of shape (N, d)
+            Actions.
+        """
+        actions = np.empty((len(X), len(W)))
+        for block, sums, total in blend(X, self.centers_, self.width_, W.T):
+            np.divide(sums.T, total[:, None], out=actions[block])
+        return actions
 
     def slopes(self, X: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Compute the slopes of all basis functions, `b_i (qᵀc_i - Σ_j b_j qᵀc_j)`, with q and c divided by σ.

@@ -9,6 +9,7 @@ local_models.py  local models that are blended
 accumulator.py   the object that fits, streams and clusters drive: add, merge, solve
 sums.py          what it holds: moments by fold, and counts
 solve.py         folds, and the choice of λ
+wide/            models so wide that samples are held instead of summed up, and solved by conjugate gradients
 posterior.py     how sure a fit is
 calibration.py   how much wider that has to be, by what was held out
 """

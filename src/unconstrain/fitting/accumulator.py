@@ -8,14 +8,14 @@ import math
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
 
 from unconstrain.arrays import check_lets_through
 from unconstrain.errors import DataError
-from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer
+from unconstrain.fitting.contact import Belief, Tally, episode_starts, infer, judge
 from unconstrain.fitting.corrected import CorrectedMoments, Part, add_up
 from unconstrain.fitting.correction import Correction
 from unconstrain.fitting.in_space import in_units
@@ -25,6 +25,9 @@ from unconstrain.fitting.observation import Observation, informative, observe, u
 from unconstrain.fitting.region import Region
 from unconstrain.fitting.solve import EpisodeFolds, choose_alpha
 from unconstrain.fitting.sums import Sums
+from unconstrain.fitting.wide.choice import choose_alpha as choose_alpha_of_held
+from unconstrain.fitting.wide.decay import WideDecay
+from unconstrain.fitting.wide.held import HeldSamples
 from unconstrain.motion import NO_MOTION, lengths
 from unconstrain.samples import Samples
 
@@ -108,12 +111,18 @@ class Record:
         `fitting.calibration`.
     regression : Solution, optional
         Ordinary regression by the same model to the same samples, where inference began with it.
+    n_anew : int
+        How many samples there were when contact was last inferred anew, and not from a policy at hand.
+    beginning : str
+        Where a policy was given to go on from: whether it was, and if not, why.
     """
 
     log_likelihoods: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
     repeated: float = 0.0
     regression: Solution | None = None
+    n_anew: int = 0
+    beginning: str = ""
 
 
 class Accumulator:
@@ -153,9 +162,14 @@ class Accumulator:
         For "adaptive": whether the sums that λ is chosen by are kept too.
     finds_region : bool
         Whether it is kept where samples lie.
+    holds : bool
+        Whether samples are held instead of summed up, since the model is wide (`fitting.wide`).
     compared : tuple of tuple of Belief
         For "adaptive": beliefs whose likelihood is summed up, instead of moments; each one for all samples, or one for
         each fold.
+    predict : callable or None
+        For "adaptive": predicts the actions that samples are judged by, from states (N, n); None for the model with the
+        belief's parameters.
     """
 
     def __init__(
@@ -184,6 +198,8 @@ class Accumulator:
         self.finds_region = unit is not None
         self.is_judged = alpha == "cv"
         self.compared: tuple[tuple[Belief, ...], ...] = ()
+        self.holds = False
+        self.predict: Callable[[np.ndarray], np.ndarray] | None = None
         self.total = Sums()
         # By fold, how coarse the boxes of earlier samples became: those of later ones need not begin finer.
         self._coarseness: list[int] = []
@@ -276,7 +292,10 @@ class Accumulator:
             moments = self._by_fold(samples, observation, counted, fold)
             return replace(counts, moments=moments, shortest=float(r.min(initial=math.inf, where=moves)))
         assert self.belief is not None
-        found = infer(self.model, self.belief, samples)
+        if self.predict is None:
+            found = infer(self.model, self.belief, samples)
+        else:
+            found = judge(self.predict(samples.states), self.belief, samples)
         moments = self._by_fold(samples, found.expand(), counted, fold)
         judges: tuple[Any, ...] = ()
         if self.is_judged:
@@ -339,7 +358,7 @@ class Accumulator:
             self.unit,
         )
         other.is_judged, other.compared = self.is_judged, self.compared
-        other.finds_region = self.finds_region
+        other.finds_region, other.holds, other.predict = self.finds_region, self.holds, self.predict
         return other
 
     def copy(self) -> "Accumulator":
@@ -388,6 +407,27 @@ class Accumulator:
         DataError
             There is nothing to learn from.
         """
+        total = self.observed(without)
+        return total.summed() if isinstance(total, HeldSamples) else total
+
+    def observed(self, without: int | None = None) -> Moments | HeldSamples:
+        """Add up all folds, or all but one, as they are kept.
+
+        Parameters
+        ----------
+        without : int, optional
+            The fold left out.
+
+        Returns
+        -------
+        Moments or HeldSamples
+            Their sum.
+
+        Raises
+        ------
+        DataError
+            There is nothing to learn from.
+        """
         return self._observed(add_up(self._folds(without)))
 
     def by_fold(self) -> list[Moments | None]:
@@ -400,6 +440,7 @@ class Accumulator:
         """
         parts = self.total.moments
         if self.risk != "corrected":
+            parts = tuple(part.summed() if isinstance(part, HeldSamples) else part for part in parts)
             return [part if isinstance(part, Moments) else None for part in parts]
         correction = Correction.of(add_up(self._folds(None)), self.noise)
         return [
@@ -407,7 +448,13 @@ class Accumulator:
             for part in parts
         ]
 
-    def solve(self, alpha: float | str | None = None, without: int | None = None) -> Solution:
+    def solve(
+        self,
+        alpha: float | str | None = None,
+        without: int | None = None,
+        *,
+        near: float | None = None,
+    ) -> Solution:
         """Solve for the parameters.
 
         Parameters
@@ -416,6 +463,8 @@ class Accumulator:
             The weight decay λ, or "cv" where the sums were kept by fold. By default as at the beginning.
         without : int, optional
             A fold to leave out; λ is then chosen among the others. It costs no pass over the data.
+        near : float, optional
+            About where λ is. Of held samples, for which each candidate costs passes, only those near it are tried.
 
         Returns
         -------
@@ -431,13 +480,32 @@ class Accumulator:
         folds = self._folds(without)
         if self.risk == "corrected":
             return self._solve_corrected(folds, alpha)
+        judges: list[Any] = [
+            part for k, part in enumerate(self.total.judges) if part is not None and k != without
+        ]
+        if self.holds:
+            return self._solve_held(folds, judges or None, alpha, near)
         total = add_up(folds)
         decay = self.model.decay(total)
         if alpha != "cv":
             return self._solution(decay.solve(total, float(alpha)), float(alpha))
-        judges = [part for k, part in enumerate(self.total.judges) if part is not None and k != without]
         chosen, alphas, risk = choose_alpha(folds, self.model.decay, judges or None)
         return self._solution(decay.solve(total, chosen), chosen, alphas, risk)
+
+    def _solve_held(
+        self,
+        folds: list[HeldSamples],
+        judges: list[HeldSamples] | None,
+        alpha: float | str,
+        near: float | None,
+    ) -> Solution:
+        """Solve by conjugate gradients, from the parameters that are believed so far."""
+        decay = WideDecay(folds, judges)
+        start = None if self.belief is None else self.belief.w
+        if alpha != "cv":
+            return self._solution(decay.solve(float(alpha), start), float(alpha))
+        chosen, alphas, risk = choose_alpha_of_held(decay, near)
+        return self._solution(decay.solve(chosen, start), chosen, alphas, risk)
 
     def _solve_corrected(self, folds: list[Any], alpha: float | str) -> Solution:
         """Find the noise of all folds together, and solve what is observed beyond it."""
@@ -536,14 +604,15 @@ class Accumulator:
             tallies.append(infer(self.model, beliefs[k], part).tally)
         return reduce(operator.add, tallies)
 
-    def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Moments:
+    def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Part:
         X, weights = samples.states, samples.weights
+        add: Callable[..., Any] = partial(HeldSamples.of, self.model) if self.holds else self.model.moments
         if rows.all():
-            return self.model.moments(X, observation, weights)
+            return add(X, observation, weights)
         index = np.flatnonzero(rows)
         # Stored a row a dimension, along which sums run.
         taken = None if weights is None else weights[index]
-        return self.model.moments(X.T.take(index, axis=1).T, observation[index], taken)
+        return add(X.T.take(index, axis=1).T, observation[index], taken)
 
 
 def find_informative_samples(risk: str, samples: Samples, moves: np.ndarray) -> np.ndarray:

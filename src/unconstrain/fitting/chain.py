@@ -98,6 +98,8 @@ def smooth(
     chain: Chain,
     log_kept: Floats | None = None,
     weights: Floats | None = None,
+    *,
+    counts: bool = True,
 ) -> tuple[Floats, Floats, Counts, Floats]:
     """Compute how surely each sample was free, given all samples of its episode.
 
@@ -113,6 +115,8 @@ def smooth(
         How much likelier a sample is where it and the one before it are both constrained, as a logarithm.
     weights : ndarray of shape (N,), optional
         How often each sample counts in the counts, 1 by default; a change counts as its later sample.
+    counts : bool
+        False leaves out the changes, which are then zero, and so is `kept`.
 
     Returns
     -------
@@ -155,6 +159,8 @@ def smooth(
     log_likelihood = top + np.log(np.einsum("nk,nk->n", before, likelihood))
     both = ahead * behind
     both /= both.sum(axis=1, keepdims=True)
+    if not counts:
+        return both[:, FREE], log_likelihood, Counts(omega @ both, np.zeros((2, 2))), np.zeros_like(top)
     inner = np.flatnonzero(~starts)
     pairs = ahead[inner - 1][:, :, None] * moves[inner] * (likelihood * behind)[inner][:, None, :]
     pairs /= pairs.sum(axis=(1, 2), keepdims=True)

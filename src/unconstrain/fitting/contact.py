@@ -31,6 +31,7 @@ from unconstrain.fitting.model import Model
 from unconstrain.fitting.noise import Noise, Squares
 from unconstrain.fitting.observation import Expanded, unknown
 from unconstrain.samples import Samples
+from unconstrain.waiting import each
 
 Floats = NDArray[np.float64]
 
@@ -291,8 +292,10 @@ def infer_free(model: Model, belief: Belief, samples: Samples) -> Floats:
     begins = np.append(np.flatnonzero(episode_starts(samples)), N)
     cuts = np.unique(begins[np.searchsorted(begins, np.arange(0, N + SOME, SOME)).clip(max=len(begins) - 1)])
     free = np.empty(N)
-    for start, stop in itertools.pairwise(cuts.tolist()):
-        free[start:stop] = infer(model, belief, samples.select(slice(start, stop))).free
+    pieces = list(itertools.pairwise(cuts.tolist()))
+    for start, stop in each(pieces, "telling which samples were free", unit="pieces"):
+        part = samples.select(slice(start, stop))
+        free[start:stop] = _smooth(model.evaluate(part.states, belief.w), belief, part, counts=False).free
     return free
 
 
@@ -313,6 +316,45 @@ def judge(P: Floats, belief: Belief, samples: Samples) -> Found:
     Found
         Of N samples.
     """
+    smoothed = _smooth(P, belief, samples)
+    views, free, starts, steps = smoothed.views, smoothed.free, smoothed.starts, smoothed.steps
+    U, P, N = views.U, views.P, len(free)
+    omega = np.ones(N) if samples.weights is None else samples.weights
+    known = smoothed.known
+    taken = np.where(known, 1.0, free)
+    echo, energy, echoing = _echo(views, taken, starts, omega)
+    tally = Tally(
+        float(omega @ smoothed.log_likelihood),
+        smoothed.counts,
+        _squares(views, taken, omega),
+        Drifts() if steps is None else steps.sum(np.where(smoothed.apart, 0.0, omega * smoothed.kept)),
+        echo,
+        energy,
+        float(omega @ np.einsum("nd,nd->n", U, U)),
+        float(omega @ np.einsum("nd,nd->n", P, P)),
+        float(omega.sum()),
+        echoing,
+    )
+    return Found(views, free, taken, known, smoothed.projections, tally, belief.residual)
+
+
+class _Smoothed(NamedTuple):
+    """How surely samples were free, and what led to it."""
+
+    views: Views
+    free: Floats
+    log_likelihood: Floats
+    counts: Counts
+    kept: Floats
+    starts: NDArray[np.bool_]
+    apart: NDArray[np.bool_]
+    steps: Steps | None
+    known: NDArray[np.bool_]
+    projections: Floats
+
+
+def _smooth(P: Floats, belief: Belief, samples: Samples, *, counts: bool = True) -> _Smoothed:
+    """Compute how surely samples were free, by predictions of their actions; without counts, that alone."""
     U = samples.actions.astype(np.float64, copy=False)
     N, d = U.shape
     ranks, known, rows = np.full(N, float(d)), np.zeros(N, dtype=bool), np.empty((0, d, d))
@@ -340,29 +382,16 @@ def judge(P: Floats, belief: Belief, samples: Samples) -> Found:
     if belief.drift is not None and d > 1 and not starts.all():
         # Along the sphere there is no noise of speed.
         steps = Steps.of(views.sphere, np.full(N, belief.noise.action), apart, belief.drift)
-    free, log_likelihood, counts, kept = smooth(
+    free, log_likelihood, counted, kept = smooth(
         log_free,
         log_bent,
         starts,
         belief.chain,
         None if steps is None else steps.log_kept,
         omega,
+        counts=counts,
     )
-    taken = np.where(known, 1.0, free)
-    echo, energy, echoing = _echo(views, taken, starts, omega)
-    tally = Tally(
-        float(omega @ log_likelihood),
-        counts,
-        _squares(views, taken, omega),
-        Drifts() if steps is None else steps.sum(np.where(apart, 0.0, omega * kept)),
-        echo,
-        energy,
-        float(omega @ np.einsum("nd,nd->n", U, U)),
-        float(omega @ np.einsum("nd,nd->n", P, P)),
-        float(omega.sum()),
-        echoing,
-    )
-    return Found(views, free, taken, known, rows, tally, belief.residual)
+    return _Smoothed(views, free, log_likelihood, counted, kept, starts, apart, steps, known, rows)
 
 
 def episode_starts(samples: Samples) -> NDArray[np.bool_]:

@@ -32,6 +32,7 @@ from unconstrain.fitting.model import LinearModel
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import observe, unknown
 from unconstrain.fitting.plausible import check_scale
+from unconstrain.fitting.wide.held import HeldSamples
 from unconstrain.motion import lengths
 from unconstrain.samples import Samples
 
@@ -202,7 +203,7 @@ class CorrectedMoments:
         return Moments(H, g, whole.squares, whole.weight, whole.n_samples)
 
 
-Part = Moments | CorrectedMoments
+Part = Moments | CorrectedMoments | HeldSamples
 """What a fold has added up, by any risk."""
 
 
@@ -211,12 +212,12 @@ def add_up(parts: Sequence[Part]) -> Any:
 
     Parameters
     ----------
-    parts : sequence of Moments or CorrectedMoments
+    parts : sequence of Moments, CorrectedMoments or HeldSamples
         One at least, all of a kind.
 
     Returns
     -------
-    Moments or CorrectedMoments
+    Moments, CorrectedMoments or HeldSamples
         Of that kind.
     """
     return reduce(add, parts)

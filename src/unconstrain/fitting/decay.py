@@ -127,6 +127,24 @@ class Decay:
         """
         return _Restored(self._decompose(self.standardize(moments)), self)
 
+    def used(self, moments: Moments, alpha: float) -> float:
+        """Count the parameters that are used, `tr H (H + λ)⁻¹`.
+
+        Parameters
+        ----------
+        moments : Moments
+            Those that this is for, of one model.
+        alpha : float
+            λ.
+
+        Returns
+        -------
+        float
+            Between zero and P.
+        """
+        values = np.maximum(np.linalg.eigvalsh(self.standardize(moments).H), 0.0)
+        return float(np.sum(values / (values + alpha * self.scale + np.finfo(np.float64).tiny)))
+
     def standardize(self, moments: Moments) -> Moments:
         """Turn moments of w into moments of w'.
 

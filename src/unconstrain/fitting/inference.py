@@ -14,8 +14,12 @@ independent, another run goes on from the better end with noise in the speed as 
 "all free" and these whose held-out likelihood none of the others clearly beats: parameters are solved without each
 fold, and noise is estimated on what was held out. "All constrained" is fitted too, but only told: it explains anything,
 and where it is right inference finds it.
+
+Given the policy of most of the samples, a single run goes on from that, and has to beat "all free" and to explain what
+is held out as well as before; else all is inferred anew (`fitting.at_hand`).
 """
 
+import itertools
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -24,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from unconstrain.fitting.accumulator import Accumulator, Record, Solution
+from unconstrain.fitting.at_hand import AtHand, describe_beginning
 from unconstrain.fitting.chain import Chain
 from unconstrain.fitting.contact import Belief, Tally
 from unconstrain.fitting.drift import Drift
@@ -32,6 +37,9 @@ from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.noise import Noise
 from unconstrain.fitting.plausible import check_scale
 from unconstrain.fitting.solve import EpisodeFolds
+from unconstrain.fitting.wide.decay import WideDecay
+from unconstrain.fitting.wide.held import HeldSamples
+from unconstrain.waiting import stage
 
 COOLING = 0.8
 """By what the noise's deviation is lowered from one pass to the next, at most."""
@@ -55,15 +63,16 @@ LEAST_NOISE, LEAST_NOISE_BESIDE_SPEED = 1e-7, 1e-3
 any single sample say how fast it was."""
 
 SPEED_AT_FIRST, LARGEST_SPEED = 0.1**2, 1.0
-FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN, SPEED = (
+FREE, CONSTRAINED, FROM_DIRECT, FROM_INCONSISTENCY, AGAIN, SPEED, AT_HAND = (
     "all free",
     "all constrained",
     "inferred, from regression",
     "inferred, from inconsistency",
     "inferred, warmed again",
     "inferred, with noise in speed",
+    "inferred, from the policy at hand",
 )
-INFERRED = (FROM_DIRECT, FROM_INCONSISTENCY, AGAIN)
+INFERRED = (FROM_DIRECT, FROM_INCONSISTENCY, AGAIN, AT_HAND)
 
 FIRST = {"regression": "whole", "ordinary regression": "direct", "inconsistency": "inconsistency"}
 """Risks of the first passes. Ordinary regression is what the policy is held against later; the first pass is it already
@@ -73,6 +82,9 @@ WARMTH = 10.0**2
 """By what the variance found is multiplied for the run that starts where the likelier of two ended. In many dimensions
 a free sample shows directions that no other does, is far from a policy that has not learnt them, and so is taken for
 constrained for ever; with more noise a policy that is nearly right takes it for free."""
+
+USUAL_RUN = 15
+"""Passes that a run from nothing takes in the usual case, for those who wait."""
 
 SHORT_RUN, SHORTEST_RUN = 8, 2
 """Passes of the runs that start where another ended, and of that which only has to learn how large residuals are."""
@@ -127,6 +139,12 @@ class Run:
         return self.accepted.total.tallies[0]
 
     @property
+    def accepted_samples(self) -> int:
+        """How many samples that pass was over."""
+        assert self.accepted is not None
+        return self.accepted.total.n_samples
+
+    @property
     def chooses_alpha(self) -> bool:
         """Whether λ is chosen with the next pass."""
         due = self.passes % PASSES_PER_CHOICE == 0 or self.since_cool == SETTLING - 1
@@ -172,7 +190,7 @@ class Run:
     def _step(self, done: Accumulator, floor: float) -> None:
         belief, (tally,) = self.belief, done.total.tallies
         if done.is_judged or self.alpha is None:
-            chosen = done.solve().alpha
+            chosen = done.solve(near=self.alpha).alpha
             if self.alpha is not None:
                 chosen = float(np.clip(chosen, self.alpha / LARGEST_STEP, self.alpha * LARGEST_STEP))
             self.alpha = chosen
@@ -180,7 +198,7 @@ class Run:
             w = done.solve(self.alpha).w
         else:
             w = done.solve(self.alpha).w
-        shrunk = _shrinkage(done, belief.w, w)
+        shrunk = 1.0 if belief.w is None else _shrinkage(done, belief.w, w)
         noise = tally.squares.estimate(self.kinds, shrunk / self.share_left)
         least = max(floor, belief.noise.action * COOLING**2 if self.cooling else 0.0)
         if noise.action >= least or not self.cooling:
@@ -207,9 +225,13 @@ class Inference:
     ----------
     blank : Accumulator
         Empty, with everything placed.
+    at_hand : AtHand, optional
+        The policy to go on from. It is forgotten where it turns out that contact has to be inferred anew.
     """
 
     blank: Accumulator
+    at_hand: AtHand | None = None
+    beginning: str = ""
     stage: str = "regression"
     runs: list[Run] = field(default_factory=list)
     compared: list[Run] = field(default_factory=list)
@@ -237,6 +259,9 @@ class Inference:
         if self.stage == "run":
             run = self.runs[-1]
             wanted = self._blank("adaptive", run.belief)
+            if run.name == AT_HAND and not run.passes:
+                assert self.at_hand is not None
+                wanted.predict = self.at_hand.start(self.blank.model.scale)[1]
             wanted.is_judged = self.blank.alpha == "cv" and run.chooses_alpha
             return wanted
         if self.stage == "final":
@@ -258,11 +283,12 @@ class Inference:
         # What counts as motion beside the longest action of all is known from the first pass on.
         self.blank.longest = max(self.blank.longest, done.total.longest)
         if self.stage == "regression":
-            self._start(done, FREE)
-            self.stage = "inconsistency" if self.regression is not None else "ordinary regression"
+            alpha = self._start(done, FREE)
+            self._begin_from(alpha, done.total.n_samples)
+            self.stage = self._after_regression if self.regression is not None else "ordinary regression"
         elif self.stage == "ordinary regression":
             self._keep_regression(done.solve())
-            self.stage = "inconsistency"
+            self.stage = self._after_regression
         elif self.stage == "inconsistency":
             self._start(done, CONSTRAINED)
             self._run(FREE, self.starts[FREE], held="free", most=SHORTEST_RUN, cooling=False)
@@ -273,7 +299,10 @@ class Inference:
             self._compare(done)
         else:
             repeated = self.repeated[self.compared[0].name]
-            done.record = Record(self.likelihoods, tuple(self.history), repeated, self.regression)
+            n_anew = done.total.n_samples if self.at_hand is None else self.at_hand.n_anew
+            done.record = Record(
+                self.likelihoods, tuple(self.history), repeated, self.regression, n_anew, self.beginning
+            )
             self.result = done
             return
         if done.folds is not None:
@@ -309,6 +338,20 @@ class Inference:
         return "last pass" if self.stage == "final" else "held-out likelihood"
 
     @property
+    def n_expected(self) -> int:
+        """How many passes are probably still to be made, for those who wait."""
+        if self.result is not None:
+            return 0
+        alone = {FREE: SHORTEST_RUN} | ({} if self.at_hand is None else {FREE: 1, AT_HAND: SHORT_RUN})
+        if self.at_hand is None:
+            alone |= {FROM_DIRECT: USUAL_RUN, FROM_INCONSISTENCY: USUAL_RUN, CONSTRAINED: SHORT_RUN}
+        made = {run.name: run.passes for run in self.runs}
+        runs = 0 if self.stage == "final" else sum(max(n - made.get(name, 0), 0) for name, n in alone.items())
+        running = bool(self.runs) and self.stage == "run" and not self.runs[-1].is_done
+        comparing = 0 if self.stage == "final" else 2
+        return max(runs, int(running)) + comparing + 1
+
+    @property
     def _floor(self) -> float:
         beside_speed = self.stage == "run" and "speed" in self.runs[-1].kinds
         share = LEAST_NOISE_BESIDE_SPEED if beside_speed else LEAST_NOISE
@@ -320,9 +363,34 @@ class Inference:
         wanted.finds_region = self.stage == "final" and wanted.finds_region  # it is the same in every pass
         return wanted
 
-    def _start(self, done: Accumulator, name: str) -> None:
+    @property
+    def _after_regression(self) -> str:
+        return "inconsistency" if self.at_hand is None else "run"
+
+    def _begin_from(self, alpha: float, n_samples: int) -> None:
+        """Go on from the policy at hand, if there is one, and nothing speaks against it."""
+        if self.at_hand is None:
+            return
+        self.beginning = describe_beginning("")
+        why_not = self.at_hand.why_not(n_samples)
+        if why_not:
+            self._begin_anew(why_not)
+            return
+        # The λ of regression is that of "all free", and large residuals are estimated once more on what is held out.
+        free = {"held": "free", "alpha": alpha, "keeps_alpha": True}
+        self._run(FREE, self.starts[FREE], most=1, cooling=False, **free)
+
+    def _begin_anew(self, why: str) -> None:
+        self.at_hand, self.beginning, self.stage = None, describe_beginning(why), "inconsistency"
+        self.runs.clear()
+        self.compared.clear()
+        self.likelihoods.clear()
+        self.repeated.clear()
+
+    def _start(self, done: Accumulator, name: str) -> float:
+        """Keep where runs start, and return its λ."""
         solution = done.solve()
-        total, d = done.moments(), self.blank.model.n_actions
+        total, d = done.observed(), self.blank.model.n_actions
         if name == FREE:
             whole = total if total.everywhere is None else total.everywhere
             self.scale = float(np.sum(whole.squares) / np.sum(whole.weight))
@@ -335,6 +403,7 @@ class Inference:
         else:
             variance = 0.25 * self.scale / d
         self.starts[name] = Belief(solution.w, Noise(max(variance, self._floor)))
+        return solution.alpha
 
     def _keep_regression(self, solution: Solution) -> None:
         self.regression = Solution(solution.w, solution.alpha, n_samples=solution.n_samples)
@@ -372,6 +441,9 @@ class Inference:
     def _next_run(self) -> None:
         """Start the next run, or compare those there are."""
         names, best = [run.name for run in self.runs], self._likeliest()
+        if self.at_hand is not None:
+            self._next_from(self.at_hand, names, best)
+            return
         if FROM_DIRECT not in names:
             self._run(FROM_DIRECT, self.starts[FREE])
         elif FROM_INCONSISTENCY not in names:
@@ -382,13 +454,48 @@ class Inference:
             self._run(AGAIN, replace(end, noise=warmer, chain=Chain(), residual=end.noise))
         elif not self.likelihoods:
             self._begin_comparison(self.runs)
-        elif SPEED not in names and self.blank.model.n_actions > 1 and best.tally.evidence > INDEPENDENT:
-            start = replace(best.end, noise=replace(best.end.noise, speed=SPEED_AT_FIRST))
-            self._go_on(SPEED, start, best.alpha, kinds=("action", "speed"))
+        elif self._may_have_speed(names, best):
+            self._add_speed(best, SPEED_AT_FIRST)
         elif CONSTRAINED not in names:
             self._go_on(CONSTRAINED, best.end, best.alpha, held="constrained")
         else:
             self._begin_comparison([run for run in self.runs if run.name not in self.likelihoods])
+
+    def _next_from(self, at_hand: AtHand, names: list[str], best: Run) -> None:
+        """Do the same where there is a policy to go on from."""
+        if AT_HAND not in names:
+            # λ is chosen with the first pass and then stays, and passes can be compared from the second on.
+            alpha = at_hand.alpha if self.blank.alpha == "cv" else None
+            start = at_hand.start(self.blank.model.scale)[0]
+            quiet = replace(start, noise=replace(start.noise, speed=0.0))
+            self._run(AT_HAND, quiet, cooling=False, since_cool=SETTLING - 1, alpha=alpha)
+        elif not self.likelihoods:
+            self._begin_comparison(self.runs)
+        elif self._may_have_speed(names, best):
+            self._add_speed(best, at_hand.belief.noise.speed or SPEED_AT_FIRST)
+        elif SPEED in names and SPEED not in self.likelihoods:
+            self._begin_comparison(self.runs[-1:])
+        else:
+            likelihood, n_samples = self.likelihoods[best.name], best.accepted_samples
+            why = at_hand.why_given_up(likelihood, n_samples, is_all_free=best.name == FREE)
+            if why:
+                self._begin_anew(why)
+            else:
+                self._finish(best)
+
+    def _finish(self, best: Run) -> None:
+        """Make the last pass, by the likeliest run."""
+        self.likelihoods = dict(sorted(self.likelihoods.items(), key=lambda item: item[0] != best.name))
+        self.compared = [best]
+        self.stage = "final"
+
+    def _may_have_speed(self, names: list[str], best: Run) -> bool:
+        """Whether noise in the speed is still to be tried."""
+        return SPEED not in names and self.blank.model.n_actions > 1 and best.tally.evidence > INDEPENDENT
+
+    def _add_speed(self, best: Run, variance: float) -> None:
+        start = replace(best.end, noise=replace(best.end.noise, speed=variance))
+        self._go_on(SPEED, start, best.alpha, kinds=("action", "speed"))
 
     def _agree(self) -> bool:
         """Whether both starts led to the same place."""
@@ -445,13 +552,12 @@ class Inference:
         if CONSTRAINED not in self.likelihoods:
             self._next_run()
             return
-        best = self._likeliest()
-        self.likelihoods = dict(sorted(self.likelihoods.items(), key=lambda item: item[0] != best.name))
-        self.compared = [best]
-        self.stage = "final"
+        self._finish(self._likeliest())
 
 
-def infer_contact(blank: Accumulator, add: Callable[[Accumulator], None]) -> Accumulator:
+def infer_contact(
+    blank: Accumulator, add: Callable[[Accumulator], None], at_hand: AtHand | None = None
+) -> Accumulator:
     """Make all passes.
 
     Parameters
@@ -460,18 +566,39 @@ def infer_contact(blank: Accumulator, add: Callable[[Accumulator], None]) -> Acc
         Empty, with everything placed.
     add : callable
         Adds all samples to an accumulator.
+    at_hand : AtHand, optional
+        The policy to go on from.
 
     Returns
     -------
     Accumulator
         With the sums of the last pass.
     """
-    inference = Inference(blank)
-    while (wanted := inference.next_pass()) is not None:
-        add(wanted)
-        inference.take(wanted)
+    inference = Inference(blank, at_hand)
+    pass_through(inference, add)
     assert inference.result is not None
     return inference.result
+
+
+def pass_through(inference: Inference, add: Callable[[Accumulator], None]) -> None:
+    """Make all passes of an inference.
+
+    Parameters
+    ----------
+    inference : Inference
+        That has not begun.
+    add : callable
+        Adds all samples to an accumulator.
+    """
+    with stage("inferring contact", unit="passes") as report:
+        for number in itertools.count(1):
+            wanted = inference.next_pass()
+            if wanted is None:
+                break
+            report.begin(f"inferring contact: {inference.description}")
+            add(wanted)
+            inference.take(wanted)
+            report(number, number + inference.n_expected)
 
 
 def _held_out_beliefs(run: Run, noise: Noise) -> tuple[Belief, ...]:
@@ -505,14 +632,16 @@ def _between(a: Belief, b: Belief) -> Belief:
     )
 
 
-def _errors(moments: Moments, w: np.ndarray) -> float:
+def _errors(moments: Moments | HeldSamples, w: np.ndarray) -> float:
     return float(np.sum(moments.risk(w[..., :, None, :])))
 
 
-def _solved(done: Accumulator, w: np.ndarray) -> tuple[Moments, np.ndarray]:
+def _solved(done: Accumulator, w: np.ndarray) -> tuple[Moments | HeldSamples, np.ndarray]:
     """Return the moments without those of all samples, and parameters in the form in which moments take them."""
-    total = replace(done.moments(), everywhere=None)
-    return total, done.model.solution(w, total.g.shape[-1])
+    total = done.observed()
+    if isinstance(total, Moments):
+        total = replace(total, everywhere=None)
+    return total, done.model.solution(w, total.n_targets)
 
 
 def _residual(done: Accumulator, w: np.ndarray) -> float:
@@ -531,11 +660,11 @@ def _shrinkage(done: Accumulator, before: np.ndarray, after: np.ndarray) -> floa
 
 def _share_left(done: Accumulator, alpha: float, count: float) -> float:
     """Share of the residuals' freedom that is left once the parameters are fitted."""
-    total = done.moments()
-    if total.H.ndim > 2:  # neighbouring local models share their samples
+    total = done.observed()
+    if isinstance(total, HeldSamples):
+        used = WideDecay([total]).used(alpha)
+    elif total.H.ndim > 2:  # neighbouring local models share their samples
         return 1.0
-    decay = done.model.decay(total)
-    standard = decay.standardize(total)
-    values = np.maximum(np.linalg.eigvalsh(standard.H), 0.0)
-    used = float(np.sum(values / (values + alpha * decay.scale + np.finfo(np.float64).tiny)))
+    else:
+        used = done.model.decay(total).used(total, alpha)
     return max(1.0 - used / max(count, 1.0), 0.2)

@@ -14,7 +14,7 @@ from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 from unconstrain.fitting.posterior import Posterior
-from unconstrain.receptive import activations, normalized_activations
+from unconstrain.receptive import activations, blend, normalized_activations
 
 PRIORS = ("global", "zero")
 
@@ -94,6 +94,8 @@ class LocalModels:
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy; see `Model.evaluate`."""
+        if isinstance(self.features, FullBasis):
+            return self._evaluate_blended(self.features, X, w)
         actions = np.zeros((len(X), self.n_actions))
         for start in range(0, len(X), BLOCK_ROWS):
             block = X[start : start + BLOCK_ROWS]
@@ -157,6 +159,16 @@ class LocalModels:
             Slopes and offsets; None for features other than (x, 1).
         """
         return self.features.linear(w) if isinstance(self.features, LinearInState) else None
+
+    def _evaluate_blended(self, features: FullBasis, X: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Blend the models first, and apply what comes of it once."""
+        actions = np.empty((len(X), self.n_actions))
+        for block, sums, total in blend(X, self.centers, self.width, w.reshape(self.n_models, -1)):
+            basis = features.basis(X[block]).T
+            each = sums.reshape(self.n_actions, len(basis), -1)
+            each *= basis
+            np.divide(each.sum(axis=1).T, total[:, None], out=actions[block])
+        return actions
 
     def _evaluate_each(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate every model, (N, M, d)."""

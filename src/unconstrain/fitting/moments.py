@@ -120,6 +120,11 @@ class Moments:
         self.H[..., rows, columns] = triangle
         self.H[..., columns, rows] = triangle
 
+    @property
+    def n_targets(self) -> int:
+        """K."""
+        return int(self.g.shape[-1])
+
     @staticmethod
     def sum(parts: Iterable["Moments"]) -> "Moments":
         """Add moments up.

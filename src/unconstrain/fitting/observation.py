@@ -100,6 +100,21 @@ class Observation(Protocol):
         """
         ...
 
+    def weigh(self, P: np.ndarray) -> np.ndarray:
+        """Compute `QᵀQ p`.
+
+        Parameters
+        ----------
+        P : ndarray of shape (N, L, d)
+            L actions for each sample.
+
+        Returns
+        -------
+        ndarray of shape (N, L, d)
+            Of each.
+        """
+        ...
+
     def __len__(self) -> int: ...
 
     def __getitem__(self, index: Any) -> "Observation": ...
@@ -161,6 +176,14 @@ class Projected:
         i, j = pairs(self.n_actions)
         products = np.einsum("nki,nkj->nij", self.rows, self.rows)[:, i, j].T
         return products if weights is None else products * weights
+
+    def weigh(self, P: np.ndarray) -> np.ndarray:
+        """Compute `QᵀQ p`; see `Observation.weigh`."""
+        if self.whole:
+            return P
+        if self.n_rows == 1:
+            return _project(self.rows[:, 0], P)
+        return np.einsum("nlk,nkd->nld", np.einsum("nkd,nld->nlk", self.rows, P), self.rows)
 
 
 @dataclass(frozen=True)
@@ -238,6 +261,10 @@ class AlongMotion:
     def products(self, weights: np.ndarray | None = None, out: np.ndarray | None = None) -> np.ndarray:
         """Compute the distinct entries of `ω û ûᵀ`; see `Observation.products`."""
         return distinct_products(self.rows[:, 0], weights, out)
+
+    def weigh(self, P: np.ndarray) -> np.ndarray:
+        """Compute `û ûᵀp`; see `Observation.weigh`."""
+        return _project(self.rows[:, 0], P)
 
 
 @dataclass(frozen=True)
@@ -377,6 +404,15 @@ class Expanded:
             products *= weights
         return products
 
+    def weigh(self, P: np.ndarray) -> np.ndarray:
+        """Compute `A p`; see `Observation.weigh`."""
+        AP = self.blunt[:, None, None] * P
+        if len(self.projections):
+            AP[self.known] = np.einsum("nij,nlj->nli", self.projections, AP[self.known])
+        AP += _project(self.ahead, P, self.along)
+        AP += _project(self.normal, P, self.towards)
+        return AP
+
 
 def unknown(projections: np.ndarray) -> np.ndarray:
     """Find the projections that are not known.
@@ -478,3 +514,11 @@ def _along_motion(U: np.ndarray, r: np.ndarray | None = None) -> AlongMotion:
         r = lengths(U)
         r[r <= NO_MOTION * r.max(initial=0.0)] = 0.0
     return AlongMotion(U, r, np.divide(1.0, r, out=np.zeros_like(r), where=r > 0))
+
+
+def _project(q: np.ndarray, P: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+    """Compute `ω q qᵀp` for q (N, d) and P (N, L, d)."""
+    along = np.einsum("nd,nld->nl", q, P)
+    if weights is not None:
+        along *= weights[:, None]
+    return along[:, :, None] * q[:, None]

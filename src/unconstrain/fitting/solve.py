@@ -9,6 +9,7 @@ from unconstrain.errors import DataError
 from unconstrain.fitting.corrected import Part, add_up
 from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
+from unconstrain.waiting import each
 
 N_FOLDS = 5
 N_ALPHAS = 25
@@ -170,7 +171,7 @@ def choose_alpha(
         raise DataError(ONE_FOLD)
     alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS)
     error = np.zeros(N_ALPHAS)
-    for i, held_out in enumerate(judges):
+    for i, held_out in each(list(enumerate(judges)), "choosing λ", unit="folds"):
         train = observed(add_up(folds[:i] + folds[i + 1 :]))
         candidates = decay_of(train).decompose(train).solve(alphas)
         error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)

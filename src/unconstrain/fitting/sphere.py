@@ -9,9 +9,12 @@ which for s << R is `N(δ; 0, s²) / area(R)` with the distance to the sphere `�
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from unconstrain.fitting.bessel_table import STEP, Table
 
 SERIES_TERMS = 1000
 """More than the power series takes wherever the Bessel function itself underflows."""
@@ -23,6 +26,9 @@ TERMS = 20
 """Of that expansion; fewer where κ is larger."""
 
 NEGLIGIBLE = 1e-18
+
+MOST_IN_TABLE = 32
+"""Dimensions up to which the Bessel functions are interpolated, in `bessel_table`."""
 
 Floats = NDArray[np.float64]
 
@@ -177,7 +183,7 @@ def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
         `1 - I_{ν+1}(κ) / I_ν(κ)`, 0 to 1. It is the derivative of `log_mean` with the sign turned, and it is returned
         rather than the mean since it falls as 1/κ, and from a mean near 1 its digits could not be recovered.
     """
-    from scipy.special import gammaln, ive
+    from scipy.special import gammaln
 
     nu = d / 2 - 1
     if d == 1:  # a sphere of two points
@@ -186,24 +192,46 @@ def scaled_bessel(d: int, kappa: Floats) -> tuple[Floats, Floats]:
     log_mean, short = np.empty_like(kappa), np.empty_like(kappa)
     least = 1e-4 * np.sqrt(d)
     with np.errstate(under="ignore", divide="ignore", invalid="ignore"):
-        huge = kappa > FAR + max(nu, 1.0) ** 2 / 2
-        near = np.flatnonzero(~huge & (kappa > least))
-        bessel = ive(nu, kappa[near])
-        usual = bessel > 1e-290
-        near, bessel = near[usual], bessel[usual]
-        log_mean[near] = gammaln(d / 2) + nu * np.log(2 / kappa[near]) + np.log(bessel)
-        short[near] = 1 - ive(nu + 1, kappa[near]) / bessel
-    rest = ~huge
-    rest[near] = False
+        rest = kappa <= least
+        near = np.flatnonzero(~rest & (kappa <= _far(nu)))
+        if d <= MOST_IN_TABLE:
+            table = _table(d)
+            usual = kappa[near] >= table.begin
+            common, near = near[usual], near[~usual]
+            log_mean[common], short[common] = table(kappa[common])
+        if len(near):
+            log_mean[near], short[near], good = _bessel(d, kappa[near])
+            rest[near[~good]] = True
+    rest |= np.isnan(kappa)
     if rest.any():
         value, slope = _series(nu, kappa[rest])
         log_mean[rest], short[rest] = value - kappa[rest], 1 - slope
+    huge = kappa > _far(nu)
     if huge.any():
         k = kappa[huge]
         beyond, beyond_next = _hankel(nu, k), _hankel(nu + 1, k)
         log_mean[huge] = gammaln(d / 2) + nu * np.log(2 / k) - 0.5 * np.log(2 * np.pi * k) + np.log1p(beyond)
         short[huge] = (beyond - beyond_next) / (1 + beyond)
     return log_mean, short
+
+
+def _far(nu: float) -> float:
+    return FAR + max(nu, 1.0) ** 2 / 2
+
+
+def _bessel(d: int, kappa: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Compute what `scaled_bessel` does by Bessel functions, and say where these do not underflow."""
+    from scipy.special import gammaln, ive
+
+    nu = d / 2 - 1
+    bessel: Floats = np.asarray(ive(nu, kappa), dtype=np.float64)
+    log_mean = float(gammaln(d / 2)) + nu * np.log(2 / kappa) + np.log(bessel)
+    return log_mean, 1 - ive(nu + 1, kappa) / bessel, bessel > 1e-290
+
+
+@cache
+def _table(d: int) -> Table:
+    return Table.of(lambda kappa: _bessel(d, kappa)[:2], STEP, STEP * (_far(d / 2 - 1) // STEP + 1))
 
 
 def _series(nu: float, kappa: Floats) -> tuple[Floats, Floats]:

@@ -9,6 +9,7 @@ from unconstrain.fitting.contact import Tally
 from unconstrain.fitting.corrected import Part
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.region import Region
+from unconstrain.fitting.wide.held import HeldSamples
 from unconstrain.motion import NO_MOTION
 
 
@@ -47,7 +48,7 @@ class Sums:
     n_known: int = 0
     longest: float = 0.0
     shortest: float = math.inf
-    judges: tuple[Moments | None, ...] = ()
+    judges: tuple[Moments | HeldSamples | None, ...] = ()
     tallies: tuple[Tally, ...] = ()
     regions: tuple[Region | None, ...] = ()
 

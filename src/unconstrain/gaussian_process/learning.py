@@ -32,6 +32,7 @@ from unconstrain.fitting.inference import (
     LARGEST_SPEED,
     LEAST_NOISE,
     Inference,
+    pass_through,
 )
 from unconstrain.fitting.model import Model
 from unconstrain.fitting.noise import Noise
@@ -43,6 +44,7 @@ from unconstrain.gaussian_process.inducing import InducingFeatures
 from unconstrain.gaussian_process.parts import is_separable
 from unconstrain.gaussian_process.process import Process
 from unconstrain.samples import Samples
+from unconstrain.waiting import each
 
 INFERRING, INFERRING_SLOWLY = 420, 210
 """Inducing rows that contact is inferred with at first, where actions share a basis and where they do not."""
@@ -253,9 +255,7 @@ def learn_adaptively(
     features = place_features(evidence, samples.states, d, INFERRING if shared else INFERRING_SLOWLY)
     inducing, blank = make_inference(features)
     inference = Inference(blank)
-    while (wanted := inference.next_pass()) is not None:
-        wanted.add(samples)
-        inference.take(wanted)
+    pass_through(inference, lambda wanted: wanted.add(samples))
     runs = {run.name: run for run in inference.runs}
     wanted_runs = {FREE, next(iter(inference.likelihoods))}
     found = max((runs[name] for name in INFERRED if name in runs), key=lambda run: run.log_likelihood)
@@ -270,7 +270,10 @@ def learn_adaptively(
         noise = Noise(max(evidence.noise * evidence.size**2, problem.floor))
         drift = Drift() if d > 1 else None
         starts.append((FROM_PROCESS, Belief(conditioned.process, noise, Chain(), drift), model))
-    ends = {name: _pass_on(problem, model, name, start, first) for name, start, first in starts}
+    ends = {
+        name: _pass_on(problem, model, name, start, first)
+        for name, start, first in each(starts, "learning kernels", unit="explanations")
+    }
     return _compare(problem, model, ends)
 
 
@@ -290,7 +293,7 @@ def _pass_on(problem: Problem, model: Any, name: str, belief: Belief, first: Any
     samples, kinds = problem.samples, _kinds(belief)
     found = infer(first, belief, samples)
     before, history = found.views.P, []
-    for number in range(MOST_PASSES):
+    for number in each(range(MOST_PASSES), name, unit="passes at most"):
         observation: Expanded = found.expand()
         noise = belief.noise.action
         if number in LEARNING:

@@ -33,6 +33,7 @@ from unconstrain.fitting.region import Region, find_apart, unite
 from unconstrain.policies.inputs import check_input
 from unconstrain.samples import Samples
 from unconstrain.spaces import Numbers, Space
+from unconstrain.waiting import stage
 
 if TYPE_CHECKING:
     from unconstrain.deploy.compiled import CompiledPolicy
@@ -113,14 +114,7 @@ class Policy(RegressorMixin, BaseEstimator):
         PolicyError
             An option is impossible.
         """
-        fresh = self._without_stability()
-        samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
-        space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
-        fresh.actions_are_scalars_ = scalars
-        order = self._order(samples)
-        samples = samples if order is None else samples.select(order)
-        fresh.learn(samples, space, noise)
-        return self._become(fresh)
+        return self._fit(X, y, groups, sample_weight, projections, type(self).learn)
 
     @abstractmethod
     def learn(self, samples: Samples, space: Space | None, noise: float | None) -> None:
@@ -263,6 +257,7 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return self.solution_.usual_speed
 
+    @stage("making it stable")
     def stabilized(
         self,
         goal: ArrayLike,
@@ -382,6 +377,7 @@ class Policy(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return max(1.0, find_apart(self.solution_.regions))
 
+    @stage("telling which samples were free")
     def free_probability(
         self,
         X: ArrayLike | Demonstrations,
@@ -729,6 +725,20 @@ class Policy(RegressorMixin, BaseEstimator):
 
     def __sklearn_is_fitted__(self) -> bool:
         return "solution_" in vars(self)
+
+    @stage("fitting")
+    def _fit(
+        self, X: Any, y: Any, groups: Any, sample_weight: Any, projections: Any, learn: Callable[..., None]
+    ) -> Self:
+        """Check what `fit` was given, and let a copy learn as `learn` does, which this policy then becomes."""
+        fresh = self._without_stability()
+        samples, scalars = check_input(fresh, X, y, groups, sample_weight, projections, first=True)
+        space, noise = (X.space, X.noise) if isinstance(X, Demonstrations) else (None, None)
+        fresh.actions_are_scalars_ = scalars
+        order = self._order(samples)
+        samples = samples if order is None else samples.select(order)
+        learn(fresh, samples, space, noise)
+        return self._become(fresh)
 
     def _order(self, samples: Samples) -> NDArray[np.intp] | None:
         return None if self.keeps_order else samples.order()

@@ -210,7 +210,10 @@ class Completing:
     def _fit_linear(self, risk: str) -> ParametricPolicy:
         X, U, groups, known, weights = self.samples
         several = groups is not None and bool(np.any(groups != groups[0]))
-        given = {"sample_weight": weights, "projections": None if risk == "direct" else known}
+        given: dict[str, Any] = {
+            "sample_weight": weights,
+            "projections": None if risk == "direct" else known,
+        }
         policy = ParametricPolicy(risk=risk, noise=self.noise or None)
         try:
             return policy.fit(X, U, groups=groups if several else None, **given)

@@ -87,6 +87,8 @@ def describe_inferred(policy: Policy) -> str:
         f"inferred: {policy.free_share_:.1%} of the samples were free",
         f"noise: {policy.noise_:.3g} in {unit}",
     ]
+    if policy.solution_.record.beginning:
+        lines.append(policy.solution_.record.beginning)
     if policy.speed_noise_ > 0:
         lines.append(f"noise of the speed: {policy.speed_noise_:.1%}")
     likelihoods = policy.log_likelihoods_

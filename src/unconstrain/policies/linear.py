@@ -15,22 +15,25 @@ from sklearn.utils.validation import check_is_fitted
 
 from unconstrain.arrays import check_choice, check_number, check_states
 from unconstrain.demonstrations import Demonstrations
-from unconstrain.errors import DataError
+from unconstrain.errors import DataError, PolicyError
 from unconstrain.fitting.accumulator import Accumulator
+from unconstrain.fitting.at_hand import AtHand, is_at_hand
 from unconstrain.fitting.calibration import Calibration
 from unconstrain.fitting.in_space import LinearInSpace
-from unconstrain.fitting.inference import infer_contact
+from unconstrain.fitting.inference import FREE, infer_contact
 from unconstrain.fitting.model import LinearModel
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import RISKS
 from unconstrain.fitting.posterior import Posterior
 from unconstrain.fitting.region import find_unit
+from unconstrain.fitting.wide.held import is_wide
 from unconstrain.policies.base import Policy
 from unconstrain.policies.inputs import check_input
 from unconstrain.policies.missing import MissingSumsError
 from unconstrain.policies.setting import settle
 from unconstrain.samples import Samples
 from unconstrain.spaces import Space
+from unconstrain.waiting import stage
 
 
 class LinearPolicy(Policy):
@@ -78,15 +81,77 @@ class LinearPolicy(Policy):
             An option is impossible.
         """
 
-    def learn(self, samples: Samples, space: Space | None, noise: float | None) -> None:
+    def fit(
+        self,
+        X: ArrayLike | Demonstrations,
+        y: ArrayLike | None = None,
+        *,
+        groups: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
+        projections: ArrayLike | None = None,
+        start: Policy | None = None,
+    ) -> Self:
+        """Learn from states and actions.
+
+        Parameters
+        ----------
+        X : array_like of shape (N, n), or Demonstrations
+            States. Demonstrations bring their actions, their episodes (where there are several) as `groups`, the
+            projections they know, and the noise of actions that were differentiated, unless these are given.
+        y : array_like of shape (N, d) or (N,)
+            Actions.
+        groups : array_like of shape (N,), optional
+            Episode labels, which are held out whole; without them contiguous blocks are.
+        sample_weight : array_like of shape (N,), optional
+            Multiplies each sample's squared error.
+        projections : array_like of shape (N, d, d), optional
+            The nullspace projection of each sample, all NaN where it is not known.
+        start : Policy, optional
+            With the adaptive risk: a policy of the same kind that was learnt from most of these samples, such as this
+            one before another episode was recorded: `policy.fit(demos, start=policy)`. Contact is inferred from what
+            it has found, in a few passes, and anew where that would not be as good (`fitting.at_hand`); all else is
+            placed and solved as without it.
+
+        Returns
+        -------
+        self
+            Fitted.
+
+        Raises
+        ------
+        DataError
+            Arrays are not finite or do not fit together, nothing moves though the risk needs directions, or a known
+            projection does not let its sample's own action through.
+        PolicyError
+            An option is impossible, or `start` is no policy to go on from.
+        """
+        at_hand = None if start is None else _at_hand(self, start)
+        learn = partial(type(self).learn, at_hand=at_hand)
+        return self._fit(X, y, groups, sample_weight, projections, learn)
+
+    def learn(
+        self,
+        samples: Samples,
+        space: Space | None,
+        noise: float | None,
+        at_hand: AtHand | None = None,
+    ) -> None:
         """Add the samples up, as often as the risk needs, and solve the sums; see `Policy.learn`."""
         accumulator = self.start(samples, space, noise)
+        if at_hand is not None and len(at_hand.scale) != accumulator.model.n_actions:
+            raise PolicyError(
+                f"start= is a policy of {len(at_hand.scale)} actions, and these samples have "
+                f"{accumulator.model.n_actions}"
+            )
+        if self.risk != "corrected":  # which takes noise away from moments
+            accumulator.holds = is_wide(accumulator.model, samples.states[:1], whole=self.risk == "direct")
         if self.risk == "adaptive":
-            accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples))
+            accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples), at_hand)
         else:
             accumulator.add(samples)
         _settle(self, accumulator)
 
+    @stage("fitting")
     def partial_fit(
         self,
         X: ArrayLike | Demonstrations,
@@ -417,6 +482,33 @@ def _settle(policy: LinearPolicy, accumulator: Accumulator) -> None:
     policy.solution_ = accumulator.solve()
     if policy.solution_.doubt:
         warnings.warn(policy.solution_.doubt, stacklevel=4)
+
+
+def _at_hand(policy: LinearPolicy, start: Policy) -> AtHand:
+    """Make of a fitted policy what inference can go on from."""
+    if policy.risk != "adaptive":
+        raise PolicyError(
+            f'start= is for risk="adaptive", and this policy has risk="{policy.risk}", which needs no start: fit anew, '
+            "or add what is new with partial_fit"
+        )
+    if type(start) is not type(policy) or not is_at_hand(start):
+        raise PolicyError(
+            f'start= needs a {type(policy).__name__} that was fitted with risk="adaptive", got {start!r:.60}'
+        )
+    solution = start.solution_
+    model, w, scale = start.model_, solution.w, start.scale_
+    belief, record = solution.belief, solution.record
+    assert belief is not None
+    return AtHand(
+        lambda X: model.evaluate(check_states(start, X), w) * scale,
+        belief,
+        scale,
+        solution.alpha,
+        start.log_likelihood_,
+        solution.n_samples,
+        record.n_anew or solution.n_samples,
+        next(iter(record.log_likelihoods)) == FREE,
+    )
 
 
 def _where_chosen(value: np.ndarray | None, name: str) -> np.ndarray:

@@ -1,6 +1,6 @@
 """A recording read block by block."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,6 +21,7 @@ from unconstrain.recordings.reading import tally
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.steps import runs
 from unconstrain.samples import Samples
+from unconstrain.waiting import within
 
 
 def read_blocks(
@@ -51,7 +52,7 @@ def read_blocks(
     whole = _whole_for(recording, everything)
     load = partial(_load, recording, everything)
     if batch_rows is None or (whole and all(file.at_once for file in recording.files)):
-        every = list(pieces)
+        every = list(_counted(recording, pieces))
         end = start + sum(len(piece.rows) for piece in every)
         if end > start:
             yield Block(start, end, partial(load, every, start, None))
@@ -65,6 +66,16 @@ def read_blocks(
         )
     else:
         yield from cut_by_rows(pieces, start, batch_rows, load)
+
+
+def _counted(recording: Recording, pieces: Iterable[Piece]) -> Iterator[Piece]:
+    """Say how many of a recording's rows were read so far."""
+    done = 0
+    with within("reading", unit="rows") as report:
+        for piece in pieces:
+            done += len(piece.rows)
+            report(done, recording.n_rows)
+            yield piece
 
 
 def check_read(recording: Recording, motion: Motion, notes: Sequence[Note]) -> None:

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from unconstrain.recordings.derivative import Array, even_grid, window_samples
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.steps import LONG_STEPS, comes_in_bursts, runs
+from unconstrain.waiting import each, stage
 
 FALLING = 0.7
 """Over twice the window, D falls to less than this share where it is noise; that of a random walk falls to half."""
@@ -127,6 +128,7 @@ class _Stretch:
         return window_samples(self.step, window) // 2
 
 
+@stage("finding how long to smooth")
 def find_smoothing(
     states: ArrayLike,
     time: ArrayLike,
@@ -209,7 +211,7 @@ def _differ_ever_longer(stretches: Sequence[_Stretch], finest: float) -> tuple[A
     differing: list[float] = []
     gains: list[float] = []
     rises, rough = False, 0.0
-    for w in tried:
+    for w in each(tried, "finding how long to smooth", unit="windows at most"):
         difference, gain = _differ(stretches, w)
         differing.append(difference)
         gains.append(gain)

@@ -28,6 +28,7 @@ from unconstrain.recordings.reading import without_tallies
 from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.tables import Tables
 from unconstrain.samples import Samples
+from unconstrain.waiting import stage
 
 BATCH_ROWS = 2**16
 """Rows in a block, unless another number is asked for."""
@@ -112,6 +113,7 @@ class Recordings:
         left = available_memory()
         return left is None or WHILE_LEARNING * self._loaded_bytes < left
 
+    @stage("reading")
     def load(self) -> Demonstrations:
         """Read all recordings into memory.
 
@@ -291,6 +293,7 @@ Openable = Recordings | Demonstrations | str | os.PathLike[str] | Iterable | Cal
 """What can be opened."""
 
 
+@stage("opening")
 def open(
     source: Openable,
     state: Keys | None = None,

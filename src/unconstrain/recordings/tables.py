@@ -19,6 +19,7 @@ from unconstrain.recordings.recording import Recording
 from unconstrain.recordings.roles import is_named
 from unconstrain.recordings.smoothing import describe_smoothing
 from unconstrain.spaces import Space
+from unconstrain.waiting import each
 
 HEAD_ROWS = 2
 
@@ -202,7 +203,7 @@ class Tables:
 
         After each recording it is checked that something of it is left, and moves.
         """
-        for recording in self.recordings:
+        for recording in each(self.recordings, "reading", unit="recordings"):
             total = Motion()
             notes: tuple[Note, ...] = ()
             for block in read_blocks(recording, batch_rows, everything=True):

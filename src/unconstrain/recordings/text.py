@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from unconstrain import atomic
 from unconstrain.demonstrations import Demonstrations
+from unconstrain.waiting import stage
 
 
 def write_csv(demos: Demonstrations, path: str | os.PathLike[str]) -> None:
@@ -43,5 +44,5 @@ def write_csv(demos: Demonstrations, path: str | os.PathLike[str]) -> None:
             number += 1
             distinct = f"{name}_{number}"
         columns[distinct] = pa.array(values)
-    with atomic.replacing(path) as temporary:
+    with stage("writing"), atomic.replacing(path) as temporary:
         pyarrow.csv.write_csv(pa.table(columns), temporary)

@@ -22,6 +22,7 @@ from unconstrain.fitting.corrected import CorrectedMoments
 from unconstrain.fitting.inference import Inference
 from unconstrain.fitting.region import Region
 from unconstrain.fitting.sums import Sums
+from unconstrain.fitting.wide.held import HeldSamples, Piece
 from unconstrain.policies.base import Policy
 from unconstrain.recordings.notes import Note
 from unconstrain.storage import Kind, encode, foreign_parts, load_object, save_object
@@ -160,6 +161,9 @@ def _check_sums(sums: Sums) -> None:
     for part in (*sums.moments, *sums.judges):
         if isinstance(part, CorrectedMoments):
             _check_types(part, CorrectedMoments)
+        elif isinstance(part, HeldSamples):
+            if not all(isinstance(each, Piece) and np.isfinite(each.Z).all() for each in part.pieces):
+                raise TypeError("its samples are none")
         elif part is not None and not all(
             np.isfinite(each).all() for each in (part.H, part.g, part.squares, part.weight)
         ):

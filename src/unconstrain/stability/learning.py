@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from unconstrain.stability.lyapunov import Array, Lyapunov
+from unconstrain.waiting import each
 
 N_TERMS = 3
 """Asymmetric quadratics beside the quadratic."""
@@ -71,7 +72,7 @@ def learn_lyapunov(
     loss = _Loss(E / length, U / (speed or 1.0), wanted / (speed or 1.0), n_terms, blocks, flat)
     rng = np.random.default_rng(random_state)
     best = None
-    for _ in range(RESTARTS if n_terms else 1):
+    for _ in each(range(RESTARTS if n_terms else 1), "making it stable", unit="starts"):
         roots = np.concatenate([np.eye(d)[None], 0.5 * rng.normal(size=(n_terms, d, d))])
         begin = np.concatenate([loss.shape(roots).ravel(), rng.normal(size=n_terms * d)])
         found = minimize(loss, begin, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS})

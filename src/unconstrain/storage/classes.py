@@ -42,6 +42,8 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
     "unconstrain.fitting.inference": ("Inference", "Run"),
     "unconstrain.fitting.noise": ("Noise", "Squares"),
     "unconstrain.fitting.region": ("Region",),
+    "unconstrain.fitting.observation": ("AlongMotion", "Expanded", "Projected"),
+    "unconstrain.fitting.wide.held": ("HeldSamples", "Piece"),
     "unconstrain.fitting.regression": ("Regressed", "Regression", "Trend"),
     "unconstrain.constraints.learnt.constant": ("ConstantConstraint",),
     "unconstrain.constraints.learnt.feature": ("FeatureConstraint",),

@@ -19,6 +19,7 @@ from unconstrain.viewer.following import USUAL
 from unconstrain.viewer.frame import Frame
 from unconstrain.viewer.page import Page
 from unconstrain.viewer.stage import DIRECT, LEARNT, Stage
+from unconstrain.waiting import stage
 
 if TYPE_CHECKING:
     from unconstrain.robots.robot import Robot
@@ -31,6 +32,7 @@ SECONDS = 4.0
 """How long, where recordings have no time."""
 
 
+@stage("drawing")
 def view(
     policy: Policy,
     demos: Demonstrations | None = None,

@@ -14,6 +14,7 @@ Artificial Intelligence Research 41, 2011.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from unconstrain import waiting
 from unconstrain.arrays import check_number, check_numbers
 from unconstrain.constraints.filtering import split_episodes
 from unconstrain.constraints.mechanisms import hand
@@ -46,6 +47,7 @@ ORDER: tuple[tuple[Kind, Places], ...] = (
 radius, and is no surface: a single smooth movement lies near some arc, and nearly always on some surface."""
 
 
+@waiting.stage("comparing mechanisms")
 def find_mechanism(
     positions: ArrayLike,
     *,
@@ -110,7 +112,7 @@ def find_mechanism(
         thinned = [thinned[i] for i in np.linspace(0, len(thinned) - 1, MOST_EPISODES).round().astype(int)]
     problem = _Problem(P, R, [own for own, _ in thinned], play, extent)
     compared: dict[tuple[str, Places], Array] = {("none", "one"): np.zeros((len(problem.each), FOLDS))}
-    for kind, places in ORDER:
+    for kind, places in waiting.each(ORDER, "comparing mechanisms", unit="kinds"):
         curve = kind in ("prismatic", "hinge")
         if (P.shape[1] == 3 or curve) and (places == "one" or 1 < len(each) <= MOST_EPISODES):
             gain = problem.hold_out(kind, places)

@@ -1,5 +1,6 @@
 """Sums over samples, in blocks that stay in the processor's cache and are shared out over threads."""
 
+import itertools
 import math
 import threading
 from collections.abc import Callable, Sequence
@@ -8,6 +9,7 @@ import numpy as np
 
 from unconstrain.memory import check_memory
 from unconstrain.parallel import cut_blocks, map_shares
+from unconstrain.waiting import stage
 
 SAMPLES_IN_PIECE = 384
 """Block lengths are multiples of this; narrow products are taken in pieces of it (see `parametric`)."""
@@ -53,13 +55,18 @@ def sum_over_blocks(
     if n_bytes > LARGE:
         check_memory(n_bytes, "a model with so many parameters", "choose fewer centres, knots or features")
 
-    def share(of_blocks: Sequence[slice]) -> Totals:
-        totals = [np.zeros(shape) for shape in shapes]
-        for block in of_blocks:
-            add(block, totals)
-        return totals
+    blocks = cut_blocks(n_samples, rows)
+    counter = itertools.count(1)
+    with stage("adding up samples", unit="blocks") as report:
 
-    first, *others = map_shares(share, cut_blocks(n_samples, rows))
+        def share(of_blocks: Sequence[slice]) -> Totals:
+            totals = [np.zeros(shape) for shape in shapes]
+            for block in of_blocks:
+                add(block, totals)
+                report(next(counter), len(blocks))
+            return totals
+
+        first, *others = map_shares(share, blocks)
     return [np.asarray(sum(parts[1:], start=parts[0])) for parts in zip(first, *others, strict=True)]
 
 

@@ -45,6 +45,7 @@ from unconstrain.recordings.inspection.timing import Timing, explained_by, judge
 from unconstrain.recordings.preparation import TIME_UNITS, Preparation
 from unconstrain.recordings.recognizing import Found, open_formats
 from unconstrain.recordings.source import open as open_recordings
+from unconstrain.waiting import stage
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -81,6 +82,7 @@ MOST_TOPICS = 30
 """Tables of one file that are looked into."""
 
 
+@stage("inspecting")
 def inspect(
     source: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], part: str | None = None
 ) -> Inspection:

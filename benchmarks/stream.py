@@ -127,7 +127,7 @@ def _child(task: str, folder: str) -> list[float]:
     return [time.perf_counter() - start]
 
 
-def _peak() -> int:
+def peak() -> int:
     """Bytes. Not `ru_maxrss` where it can be helped: on Linux a process inherits that of the one that started it."""
     status = Path("/proc/self/status")
     if status.exists():
@@ -138,4 +138,4 @@ def _peak() -> int:
 
 if __name__ == "__main__":
     seconds = _child(*sys.argv[1:])
-    print(json.dumps({"seconds": seconds, "peak": _peak()}))
+    print(json.dumps({"seconds": seconds, "peak": peak()}))

@@ -470,8 +470,8 @@ def _array(what: str, values: ArrayLike) -> Array:
 
 
 def _check_finite(what: str, array: Array, good: NDArray[np.bool_]) -> None:
-    bad = np.argwhere(~good)
-    if len(bad):
+    if not good.all():
+        bad = np.argwhere(~good)
         row, *rest = bad[0].tolist()
         column = f", column {rest[0]}" if rest else ""
         raise DataError(
@@ -578,12 +578,19 @@ def _episodes(
         distinct, codes = np.unique(values, return_inverse=True)
         return codes.astype(np.int64), tuple(str(value) for value in distinct)
     labels = _listed("episode_labels", labels)
-    if values.dtype.kind == "U" or not np.array_equal(np.unique(values), np.arange(len(labels))):
+    if values.dtype.kind == "U" or not _number(values, len(labels)):
         raise DataError(
             f"episodes must be the numbers 0 to {len(labels) - 1}, each used, "
             f"to go with {len(labels)} episode_labels"
         )
     return values.astype(np.int64), tuple(str(label) for label in labels)
+
+
+def _number(values: NDArray[Any], count: int) -> bool:
+    """Whether values (N,) are the numbers from 0 to `count` - 1, each used."""
+    if values.min(initial=0) < 0 or values.max(initial=0) >= count:
+        return False
+    return bool(np.bincount(values.astype(np.int64), minlength=count).all())
 
 
 def _index(samples: ArrayLike | slice, count: int) -> Codes:

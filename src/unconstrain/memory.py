@@ -6,8 +6,8 @@ from pathlib import Path
 from unconstrain.errors import DataError
 
 GIGABYTE = 1e9
-NO_MATTER = 1e4
-"""Bytes of which nobody asks: to look how much is left takes longer than a step of a rollout."""
+NO_MATTER = 1e6
+"""Bytes of which nobody asks: to look how much is left takes longer than a step of a rollout, or a short episode."""
 CONTAINER = Path("/sys/fs/cgroup")
 """Where Linux says how much memory a container may take."""
 

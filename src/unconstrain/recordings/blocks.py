@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.recordings.episodewise import norms
 from unconstrain.recordings.notes import Note
 from unconstrain.samples import Samples
 from unconstrain.spaces import Space
@@ -48,7 +49,7 @@ class Motion:
     @classmethod
     def of(cls, U: Array) -> "Motion":
         """Look at actions (N, d)."""
-        return cls(len(U), bool(np.any(U)), float(np.linalg.norm(U, axis=1).max(initial=0.0)))
+        return cls(len(U), bool(np.any(U)), float(norms(U).max(initial=0.0)))
 
     def __add__(self, other: "Motion") -> "Motion":
         """Return the motion of both together."""
@@ -183,7 +184,7 @@ class Source(Protocol):
 def leave_out_slow(loaded: Loaded, least: float) -> Loaded:
     """Leave out samples whose action is shorter than `least`, with a note of how many went."""
     U = loaded.samples.actions
-    speeds = np.linalg.norm(U, axis=1)
+    speeds = norms(U)
     keep = speeds >= least
     text = f"left out {{}} of {{}} slower than {least:g}"
     note = Note("slow", "", text, (int(np.sum(~keep)), len(U)), ("", "sample"))

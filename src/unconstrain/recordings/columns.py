@@ -128,6 +128,21 @@ class Columns:
         return (self.topic,) if isinstance(self.topic, str) else tuple(self.topic)
 
     @property
+    def read(self) -> dict[str, Keys]:
+        """What is read of files, by role; nothing without states. Angles and rotations are states."""
+        every: dict[str, Keys | None] = {
+            "state": self.state,
+            "action": None if self.differentiated else self.action,
+            "time": self.time,
+            "episode": self.episode,
+            "force": self.force,
+            "free": self.free,
+            "projections": self.projections,
+            "relative_to": None if self.relative_to in (START, GOAL) else self.relative_to,
+        }
+        return {} if self.state is None else {role: keys for role, keys in every.items() if keys is not None}
+
+    @property
     def differentiated(self) -> bool:
         """Whether the actions are the derivative of the states."""
         return self.action is None or self.action == DIFFERENTIATE

@@ -53,8 +53,8 @@ class File:
     filesystem: Any
 
     def __getstate__(self) -> dict[str, Any]:
-        # pyarrow's account of a file cannot be sent to another process, which asks for its own.
-        return {name: value for name, value in self.__dict__.items() if name != "info"}
+        """Return what travels to another process, where the size and the like are asked for again."""
+        return {"shown": self.shown, "path": self.path, "filesystem": self.filesystem}
 
     @property
     def name(self) -> str:

@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.recordings.steps import typical_step
+from unconstrain.recordings.episodewise import percentile, step_norms
+from unconstrain.recordings.steps import follow_each_other, typical_step
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -82,20 +83,24 @@ def split(
     -------
     Fragments
     """
-    order = np.argsort(episodes, kind="stable")
-    X, t, e = states[order], time[order], episodes[order]
+    X, t, e = states, time, episodes
+    follow = follow_each_other(episodes)
+    if not follow:
+        order = np.argsort(episodes, kind="stable")
+        X, t, e = states[order], time[order], episodes[order]
     own = _runs(e)
-    within = np.diff(e) == 0
+    within = e[1:] == e[:-1]
     steps = np.diff(t)
     with np.errstate(divide="ignore", invalid="ignore"):  # steps between episodes, masked below
-        speeds = np.linalg.norm(np.diff(X, axis=0), axis=1) / steps
+        speeds = step_norms(X) / steps
     longest = np.full(len(own), np.inf if gap is None else gap)
     if gap is None:
         for code, one in enumerate(own):
             if one.stop - one.start > 1:
                 longest[code] = GAP_STEPS * typical_step(steps[one.start : one.stop - 1])
-    gaps = within & (steps > longest[e[1:]])
-    fast = within & ~gaps & (speeds > (np.inf if max_speed is None else max_speed))
+    never = np.zeros(len(steps), dtype=bool)
+    gaps = within & (steps > longest[e[1:]]) if np.isfinite(longest).any() else never
+    fast = never if max_speed is None else within & ~gaps & (speeds > max_speed)
     unbroken = within & ~gaps & ~fast
 
     fragment = np.concatenate([[0], np.cumsum(~unbroken)])
@@ -104,21 +109,30 @@ def split(
     origins: list[tuple[int, int]] = []
     dropped = suspicious = 0
     for code, one in enumerate(own):
-        parts = [slice(one.start + part.start, one.start + part.stop) for part in _runs(fragment[one])]
+        whole = fragment[one.start] == fragment[one.stop - 1]
+        parts = (
+            [one]
+            if whole
+            else [slice(one.start + part.start, one.start + part.stop) for part in _runs(fragment[one])]
+        )
         good = [part for part in parts if (len(parts) == 1 and not drop_short) or long_enough(t[part])]
         dropped += len(parts) - len(good)
         for number, part in enumerate(good, start=1):
             kept[part], codes[part] = True, len(origins)
             origins.append((code, number if len(good) > 1 else 0))
-        own_speeds = speeds[one.start : one.stop - 1][unbroken[one.start : one.stop - 1]]
-        typical = np.percentile(own_speeds, 95) if len(own_speeds) else 0.0
+        own_speeds = speeds[one.start : one.stop - 1]
+        if not whole:
+            own_speeds = own_speeds[unbroken[one.start : one.stop - 1]]
+        typical = percentile(own_speeds, 95) if len(own_speeds) else 0.0
         suspicious += int(np.sum(own_speeds > SUSPICIOUS * typical)) if typical > 0 else 0
 
-    back = np.argsort(order, kind="stable")  # to the order of the file
-    samples = np.flatnonzero(kept[back])
+    if not follow:  # to the order of the file
+        back = np.argsort(order, kind="stable")
+        kept, codes = kept[back], codes[back]
+    samples = np.flatnonzero(kept)
     return Fragments(
         samples=samples,
-        episodes=codes[back][samples],
+        episodes=codes[samples],
         origins=tuple(origins),
         gaps=int(gaps.sum()),
         fast=int(fast.sum()),

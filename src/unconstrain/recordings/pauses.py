@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from unconstrain.recordings.episodewise import percentile
+
 Array = NDArray[np.float64]
 
 # At rest an action is shorter than this share of all but 5 % of those of its episode.
@@ -12,13 +14,13 @@ AT_REST = 0.02
 SHORTEST = 0.5
 
 
-def find_pauses(U: Array, time: Array) -> tuple[NDArray[np.bool_], int]:
+def find_pauses(speeds: Array, time: Array) -> tuple[NDArray[np.bool_], int]:
     """Find the pauses of one episode.
 
     Parameters
     ----------
-    U : ndarray of shape (N, d)
-        Velocities.
+    speeds : ndarray of shape (N,)
+        Lengths of the velocities.
     time : ndarray of shape (N,)
         Seconds, increasing.
 
@@ -29,11 +31,12 @@ def find_pauses(U: Array, time: Array) -> tuple[NDArray[np.bool_], int]:
     int
         How many pauses there are.
     """
-    resting = np.zeros(len(U), dtype=bool)
-    if len(U) < 2:
+    resting = np.zeros(len(speeds), dtype=bool)
+    if len(speeds) < 2:
         return resting, 0
-    speeds = np.linalg.norm(U, axis=1)
-    still = speeds <= AT_REST * np.percentile(speeds, 95)
+    still = speeds <= AT_REST * percentile(speeds, 95)
+    if not still.any():
+        return resting, 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     count = 0
     for begin, end in edges.reshape(-1, 2):

@@ -1,6 +1,6 @@
 """Pieces of files, and their columns as arrays."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from unconstrain.arrays import NOT_IDEMPOTENT, not_idempotent
 from unconstrain.errors import DataError
+from unconstrain.recordings.episodewise import BLOCK
 from unconstrain.recordings.formats.base import ColumnKey, Format
 from unconstrain.recordings.table import Cells, Field, describe_kind, is_text
 
@@ -118,7 +119,9 @@ class Piece(NamedTuple):
         return cells
 
 
-def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) -> NDArray[Any]:
+def read_numbers(
+    pieces: Sequence[Piece], fields: Sequence[Field], role: str, *, by_row: bool = False
+) -> NDArray[Any]:
     """Read fields as finite numbers.
 
     Parameters
@@ -127,6 +130,8 @@ def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) ->
     fields : sequence of Field
     role : str
         What they are for, as the user calls it.
+    by_row : bool
+        Whether the numbers of a row lie beside each other in memory, rather than those of a field.
 
     Returns
     -------
@@ -141,7 +146,8 @@ def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) ->
     """
     shape = (len(fields), sum(len(piece.rows) for piece in pieces))
     single = all(_is_single(piece.column(field.key).type) for piece in pieces for field in fields)
-    numbers: NDArray[Any] = np.empty(shape, np.float32 if single else np.float64)
+    kind = np.float32 if single else np.float64
+    numbers: NDArray[Any] = np.empty(shape[::-1], kind).T if by_row else np.empty(shape, kind)
     columns: Places = {}
     for i, field in enumerate(fields):
         columns.setdefault(field.key, []).append((i, field))
@@ -153,7 +159,7 @@ def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) ->
     # A sum of squares is finite and small if and only if every number is, and costs next to nothing. Where it
     # overflows, as it does from 1e19 in single precision, the numbers are looked at one by one.
     with np.errstate(over="ignore"):
-        usual = usual and float(np.dot(numbers.ravel(), numbers.ravel())) < 1e300
+        usual = usual and float(np.dot(numbers.ravel("K"), numbers.ravel("K"))) < 1e300
     if not usual:
         at = 0
         for piece in pieces:
@@ -167,12 +173,6 @@ def read_numbers(pieces: Sequence[Piece], fields: Sequence[Field], role: str) ->
 def read_flags(pieces: Sequence[Piece], field: Field) -> Array:
     """Read flags (N,), 1 or 0. Raises `DataError` that names file, column and row of anything else."""
     return np.concatenate([piece.cells(field, "free").flags() for piece in pieces])
-
-
-def read_labels(pieces: Sequence[Piece], field: Field) -> NDArray[Any]:
-    """Read the values (N,) that tell episodes apart. Raises `DataError` that names file, column and row of a gap."""
-    parts = [piece.alike(field, "episode").labels() for piece in pieces]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def read_projections(
@@ -215,19 +215,6 @@ def read_projections(
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def places(pieces: Sequence[Piece]) -> Callable[[int], str]:
-    """Return what says where in their files a row of these pieces is."""
-    bounds = np.cumsum([0, *(len(piece.rows) for piece in pieces)])
-
-    def place(index: int) -> str:
-        which = int(np.searchsorted(bounds, index, side="right")) - 1
-        piece = pieces[which]
-        at = piece.place(index - int(bounds[which]))
-        return f"{at} of {piece.format.file.shown}" if piece.file != pieces[0].file else at
-
-    return place
-
-
 def _fill(numbers: NDArray[Any], piece: Piece, columns: Places) -> bool:
     """Write a piece's columns into their rows of `numbers`; False if anything about them is unusual."""
     arrays: list[Any] = [None] * len(numbers)
@@ -245,9 +232,18 @@ def _fill(numbers: NDArray[Any], piece: Piece, columns: Places) -> bool:
         rows = _matrix(values, fields[0][1].width)
         if rows is None:
             return False
+        own = [(i, field.component) for i, field in fields]
+        if own == [(i, i) for i in range(len(numbers))] and rows.shape[1] == len(numbers):
+            numbers[...] = rows.T
+            return True
         for i, field in fields:
             arrays[i] = rows[:, field.component]
-    np.stack(arrays, out=numbers)  # one operation, where threads would wait for each other at each of many
+    if numbers.flags.c_contiguous:
+        # One operation, where threads would wait for each other at each of many.
+        np.stack(arrays, out=numbers)
+        return True
+    for at in range(0, numbers.shape[1], BLOCK):
+        np.stack([array[at : at + BLOCK] for array in arrays], out=numbers[:, at : at + BLOCK])
     return True
 
 

@@ -11,7 +11,7 @@ from unconstrain.errors import DataError
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File, Folder, locate
 from unconstrain.recordings.formats import FORMATS, lerobot, recognize, rosbag_reading
-from unconstrain.recordings.formats.base import Format, narrow, narrow_to_part
+from unconstrain.recordings.formats.base import Format, foresee, narrow, narrow_to_part
 from unconstrain.recordings.formats.lerobot import LeRobot
 from unconstrain.recordings.formats.nested import Nested
 from unconstrain.recordings.formats.npy import Npy, NpyFolder, belong_together
@@ -78,7 +78,7 @@ def open_formats(
     return [
         Found(
             shown,
-            _joined(shown, [narrow(next(opened), columns.topics) for _ in files], time_axis, columns.part),
+            _joined(shown, [narrow(next(opened), columns.topics) for _ in files], time_axis, columns),
             robot,
         )
         for shown, files, robot in located
@@ -135,11 +135,11 @@ def _open_file(about: tuple[File, bool]) -> Format:
     return opened
 
 
-def _joined(shown: str, formats: list[Format], time_axis: str | None, part: str | None) -> list[Format]:
+def _joined(shown: str, formats: list[Format], time_axis: str | None, columns: Columns) -> list[Format]:
     """Make one format of the arrays of a folder, and say what is read of it; other files are read in turn."""
     arrays = [each for each in formats if isinstance(each, Npy)]
     joined: list[Format] = [NpyFolder(shown, arrays)] if len(arrays) == len(formats) > 1 else formats
-    joined = [narrow_to_part(each, part) for each in joined]
+    joined = [foresee(narrow_to_part(each, columns.part), columns) for each in joined]
     if time_axis is None:
         return joined
     if not all(isinstance(each, Nested) for each in joined):

@@ -15,7 +15,8 @@ from unconstrain.recordings.columns import NO_ANGLE, Columns
 from unconstrain.recordings.derivative import longest_window
 from unconstrain.recordings.files import label as label_files
 from unconstrain.recordings.formats.base import ColumnKey, Declared, Format
-from unconstrain.recordings.pieces import Piece, read_labels, read_numbers
+from unconstrain.recordings.joined import read_labels
+from unconstrain.recordings.pieces import Piece, read_numbers
 from unconstrain.recordings.preparation import TIME_UNITS, Preparation
 from unconstrain.recordings.roles import Roles
 from unconstrain.recordings.smoothing import Smoothing

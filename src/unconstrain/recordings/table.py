@@ -321,6 +321,9 @@ class Cells:
         DataError
             An empty cell or NaN, or values that cannot tell episodes apart.
         """
+        own = self._repeated_labels()
+        if own is not None:
+            return own
         values = self.filled()
         if pa.types.is_nested(values.type):
             raise DataError(
@@ -332,6 +335,20 @@ class Cells:
         elif not (pa.types.is_integer(values.type) or is_text(values.type)):
             values = values.cast(pa.string())
         return values.to_numpy(zero_copy_only=False)
+
+    def _repeated_labels(self) -> NDArray[Any] | None:
+        """Return the values of a column of text, each made but once; None for another column, or with empty cells."""
+        values, kind = self.values, self.values.type
+        if isinstance(values, pa.ChunkedArray) or values.null_count:
+            return None
+        if is_text(kind):
+            values = values.dictionary_encode()
+        elif not (pa.types.is_dictionary(kind) and is_text(kind.value_type)):
+            return None
+        distinct = pc.utf8_trim_whitespace(values.dictionary)
+        if distinct.null_count or pc.any(pc.equal(distinct, "")).as_py():
+            return None
+        return distinct.to_numpy(zero_copy_only=False)[values.indices.to_numpy()]
 
     def filled(self) -> Any:
         """Return the values as an Arrow array without missing ones; text is stripped of spaces around it.

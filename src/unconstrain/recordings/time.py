@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from unconstrain.errors import DataError
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.preparation import TIME_UNITS
-from unconstrain.recordings.steps import typical_step
+from unconstrain.recordings.steps import comes_in_bursts, follow_each_other, typical_step
 from unconstrain.recordings.table import Cells, is_text
 
 Codes = NDArray[np.int64]
@@ -90,9 +90,12 @@ class Clock:
         if rate is not None and own is None:
             return cls("frames", text, typical_step(steps, rate) / rate, rate)
         first = float(abs(ticks[0])) if len(ticks) else 0.0
-        guess, guessed = _guess(first, typical_step(steps, math.inf))
+        usual = typical_step(steps, math.inf)
+        guess, guessed = _guess(first, usual)
         found = own or unit or guess
-        typical = typical_step(steps, TIME_UNITS[found])
+        # What comes in no bursts however long a second is, does so in no unit.
+        bursts = comes_in_bursts(steps[steps > 0], math.inf)
+        typical = typical_step(steps, TIME_UNITS[found]) if bursts else usual
         if own is unit is None:  # what seemed bursts may have been gaps
             found, guessed = _guess(first, typical)
         guessed = guessed and own is unit is None
@@ -183,7 +186,8 @@ class Clock:
                 + ", or give episode=, the column that tells episodes apart"
             )
         starts = np.zeros(int(episodes.max()) + 1, dtype=ticks.dtype)
-        starts[episodes[order[::-1]]] = ticks[order[::-1]]  # the last one written is an episode's first
+        begins = order[np.flatnonzero(np.concatenate([[True], ~within]))]
+        starts[episodes[begins]] = ticks[begins]
         return (ticks - starts[episodes]) / self.ticks_a_second
 
 
@@ -197,6 +201,8 @@ def repeated(ticks: NDArray[Any], episodes: Codes) -> NDArray[np.bool_]:
 
 def _steps(ticks: NDArray[Any], episodes: Codes) -> tuple[Codes, NDArray[Any], NDArray[np.bool_]]:
     """Return the order (N,) of stamps episode by episode, the steps (N-1,) then, and which lie within an episode."""
+    if follow_each_other(episodes):
+        return np.arange(len(episodes)), np.diff(ticks), episodes[1:] == episodes[:-1]
     order = np.argsort(episodes, kind="stable")
     return order, np.diff(ticks[order]), np.diff(episodes[order]) == 0
 

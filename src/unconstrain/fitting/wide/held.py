@@ -91,6 +91,17 @@ class HeldSamples:
         return sum(len(piece) for piece in self.pieces)
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of memory that they take."""
+        arrays = [
+            each
+            for piece in self.pieces
+            for each in (piece.Z, piece.weights, *vars(piece.observation).values())
+            if isinstance(each, np.ndarray)
+        ]
+        return sum(each.nbytes for each in arrays)
+
+    @property
     def weight(self) -> np.ndarray:
         """`Σ ω_n`."""
         return np.asarray(

@@ -278,6 +278,31 @@ def narrow(opened: Format, topics: tuple[str, ...]) -> Format:
     return opened.for_topics(topics)
 
 
+@runtime_checkable
+class ForeseesColumns(Protocol):
+    """What a format does too that reads the columns that will be asked for all at once."""
+
+    def for_columns(self, wanted: Columns) -> Format:
+        """Return the same file, of which these columns will be read. That some are not there, `columns` says."""
+        ...
+
+
+def foresee(opened: Format, wanted: Columns) -> Format:
+    """Return a file that knows which of its columns will be read, where it makes use of that.
+
+    Parameters
+    ----------
+    opened : Format
+    wanted : Columns
+        As given.
+
+    Returns
+    -------
+    Format
+    """
+    return opened.for_columns(wanted) if isinstance(opened, ForeseesColumns) else opened
+
+
 def narrow_to_part(opened: Format, part: str | None) -> Format:
     """Return a file of which one part is read.
 

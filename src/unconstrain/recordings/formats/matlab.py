@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from unconstrain.memory import available_memory, check_memory
+from unconstrain.memory import check_memory
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.base import damage_named
 from unconstrain.recordings.formats.hdf5 import Hdf5, is_hdf5
@@ -27,8 +27,11 @@ DEEPEST = 32
 COMPRESSED = 15
 """The mark of a compressed variable."""
 
-PIECE = 1 << 20
-"""Bytes that are decompressed at a time, to count them."""
+PIECE = 1 << 16
+"""Bytes that are decompressed at a time, between which the memory is checked."""
+
+OFTEN = 1 << 24
+"""Bytes decompressed between two looks at the memory."""
 
 
 class Matlab(Nested):
@@ -66,10 +69,12 @@ class Matlab(Nested):
         check_memory(2.0 * self.file.info.size, f"reading {shown}", "write a file a demonstration")
         data = self.file.read()
         with damage_named(shown, self.kind):
-            needed = len(data) + GROWTH * float(_count_inflated(data))
-            check_memory(needed, f"reading {shown}", "write a file a demonstration, or save it with -v7.3")
-            if 0 not in data[:4]:
+            remedy = "write a file a demonstration, or save it with -v7.3"
+            if 0 not in data[:4]:  # version 4 compresses nothing
+                data = _inflate(data, f"reading {shown}", remedy)
                 check_variables(data)
+            needed = (1.0 + GROWTH) * len(data)
+            check_memory(needed, f"reading {shown}", remedy)
             # Cells of a shape that the file cannot hold would be allocated before they are read.
             content: Any = io.BytesIO(data)
             for _, shape, _ in scipy.io.whosmat(content):
@@ -166,24 +171,34 @@ def _node(value: Any, depth: int = 0) -> Node:
     return Leaf(value.shape, value.dtype, value)
 
 
-def _count_inflated(data: bytes) -> int:
-    """Count the bytes that the variables of a file take when decompressed, or as many as there is memory for."""
-    if 0 in data[:4]:  # version 4, which compresses nothing
-        return len(data)
+def _inflate(data: bytes, what: str, remedy: str) -> bytes:
+    """Return a file of version 5 with none of its variables compressed: decompressing takes longer than all else.
+
+    What is cut short stays so. Raises `DataError` as soon as it would not fit into memory.
+    """
     order = "<" if data[126:128] == b"IM" else ">"
-    left = available_memory()
-    at, count = 128, 0
-    while at + 8 <= len(data):
+    view = memoryview(data)
+    pieces: list[bytes | memoryview] = [view[:128]]
+    at, count, looked = 128, 0, 0
+    while at < len(data):
+        if at + 8 > len(data):
+            pieces.append(view[at:])
+            break
         kind, size = (int(number) for number in np.frombuffer(data, f"{order}u4", 2, at))
-        body = data[at + 8 : at + 8 + size]
-        at += 8 + size
+        body = view[at + 8 : at + 8 + size]
         if kind != COMPRESSED:
+            pieces.append(view[at : at + 8 + size])
             count += len(body)
-            continue
-        unpacker = zlib.decompressobj()
-        while body and not unpacker.eof:
-            count += len(unpacker.decompress(body, PIECE))
-            body = unpacker.unconsumed_tail
-            if left is not None and GROWTH * count > left:
-                return count
-    return max(count, len(data))
+        else:
+            if len(body) < size:
+                raise ValueError("an element that is longer than what holds it")
+            unpacker = zlib.decompressobj()
+            for begin in range(0, len(body), PIECE):
+                piece = unpacker.decompress(body[begin : begin + PIECE])
+                pieces.append(piece)
+                count += len(piece)
+                if count > looked + OFTEN:
+                    check_memory(GROWTH * float(count), what, remedy)
+                    looked = count
+        at += 8 + size
+    return data if len(pieces) == 1 else b"".join(pieces)

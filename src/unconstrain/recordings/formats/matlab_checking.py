@@ -1,5 +1,6 @@
 """Damage in MATLAB files of version 5 on which SciPy would end the program instead of raising an error."""
 
+import struct
 import zlib
 from collections.abc import Iterator
 
@@ -79,9 +80,9 @@ def _check(kind: int, body: memoryview, order: str, depth: int) -> None:
 
 def _elements(data: memoryview, order: str, padded: bool = True) -> Iterator[tuple[int, memoryview]]:
     """Yield the type and the content of each element; compressed ones are not padded to eight bytes."""
-    at = 0
+    at, tag = 0, struct.Struct(f"{order}II").unpack_from
     while at + 8 <= len(data):
-        kind, size = (int(number) for number in np.frombuffer(data, f"{order}u4", 2, at))
+        kind, size = tag(data, at)
         if kind >> 16:  # a small one, whose content is beside its tag
             kind, size = kind & 0xFFFF, kind >> 16
             yield kind, data[at + 4 : at + 4 + min(size, 4)]

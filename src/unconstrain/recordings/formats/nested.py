@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from unconstrain.errors import DataError
 from unconstrain.memory import check_memory
-from unconstrain.recordings.columns import Columns
+from unconstrain.recordings.columns import Columns, Key
 from unconstrain.recordings.files import File
 from unconstrain.recordings.formats.aligning import TIMES, bring, name_of
 from unconstrain.recordings.formats.arrays import to_arrow
@@ -56,6 +56,13 @@ class Nested:
         self.file = file
         self.time_axis: str | None = None
         self.part: str | None = None
+        self.time: Key | None = None
+
+    def for_columns(self, wanted: Columns) -> "Nested":
+        """Return the same file, of which these columns will be read: where a time is given, none is looked for."""
+        other = self._unread()
+        other.time = wanted.time
+        return other
 
     def with_time_axis(self, axis: str) -> "Nested":
         """Return the same file, in whose demonstrations the first or the last axis is time, as a user says."""
@@ -118,15 +125,16 @@ class Nested:
         stop = sum(table.lengths) if stop is None else stop
         guesses = table.guesses(names)
         held = _Held()
-        begin = 0
+        begin, about = 0, note_guesses(guesses)
         with damage_named(self.file.shown, self.kind), self.opened() as fetch:
             for which, length in enumerate(table.lengths):
                 low, high = max(start - begin, 0), min(stop - begin, length)
                 if low < high:
                     whole = high - low == length
                     values = self._read_one(fetch, which, names, held if whole else None)
-                    said = [*guesses, *(held.notes() if begin + high == stop else ())]
-                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=note_guesses(said))
+                    if begin + high == stop:
+                        about = note_guesses([*guesses, *held.notes()])
+                    batch = pa.RecordBatch.from_arrays(values, names=names, metadata=about)
                     yield begin + low, batch.slice(low, high - low)
                 begin += length
 
@@ -150,7 +158,7 @@ class Nested:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the file alone: what was read of it may be large."""
-        return {"file": replace(self.file), "time_axis": self.time_axis, "part": self.part}
+        return {"file": replace(self.file), "time_axis": self.time_axis, "part": self.part, "time": self.time}
 
     def tree(self) -> dict[str, Node]:
         """Read what there is in the file. Each format has its own."""
@@ -210,6 +218,8 @@ class Nested:
         time = (
             table.time
             if table.step is not None
+            else None
+            if self.time is not None
             else next(
                 (
                     path
@@ -258,7 +268,7 @@ class Nested:
                 values.append(pa.array(table.codes))
                 continue
             if name not in parts:
-                values.append(pa.array([table.labels[which].as_py()] * length, table.labels.type))
+                values.append(pa.repeat(table.labels[which], length))
                 continue
             each = parts[name]
             array = np.asarray(fetch(each.parts[which]))

@@ -73,7 +73,8 @@ class Stacked:
         if axis is None:
             rows = np.broadcast_to(array.reshape(1, -1), (length, array.size))
         else:
-            rows = np.moveaxis(array, axis, 0)[:length].reshape(length, -1)
+            rows = array if axis == 0 else np.moveaxis(array, axis, 0)
+            rows = rows[:length].reshape(length, -1)
         return rows if self.width else rows[:, 0]
 
 

@@ -1,6 +1,6 @@
 """Text tables: CSV, TSV and the like, with or without a header."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from unconstrain.recordings.columns import Columns
 from unconstrain.recordings.files import File
-from unconstrain.recordings.formats import labview, motion_capture, opensim, qualisys
+from unconstrain.recordings.formats import kept, labview, motion_capture, opensim, qualisys
 from unconstrain.recordings.formats.base import (
     ColumnKey,
     Declared,
@@ -20,12 +20,20 @@ from unconstrain.recordings.formats.base import (
     find_part,
     note_guesses,
 )
-from unconstrain.recordings.formats.text_encoding import begin_text, is_compressed, members, read_text
+from unconstrain.recordings.formats.text_encoding import (
+    begin_text,
+    find_codec,
+    is_compressed,
+    members,
+    read_text,
+)
 from unconstrain.recordings.formats.text_layout import PROBED, find_layout
 from unconstrain.recordings.formats.text_lines import Layout, content, join_header, lines_of
-from unconstrain.recordings.formats.text_made import Part
+from unconstrain.recordings.formats.text_made import Part, cells_of
 from unconstrain.recordings.formats.text_parsing import parse
+from unconstrain.recordings.formats.text_plain import Plain, read_plain
 from unconstrain.recordings.formats.text_rows import Rows, begins_anew, find_rows
+from unconstrain.recordings.formats.text_wanted import find_wanted
 from unconstrain.recordings.table import Column, Header
 from unconstrain.recordings.units import said_of_units, unit_in
 
@@ -33,6 +41,12 @@ PROGRAMS = (
     motion_capture.find_motive, qualisys.find_qualisys, labview.find_labview, opensim.find_trc, opensim.find_storage,
 )  # fmt: skip
 """Programs that write header blocks of their own: each finds the layout where it wrote the text."""
+
+CACHED = ("_begun", "_layout", "_sheet", "row_groups", "_is_unusual")
+"""What was found of one part of a file, or for one choice of columns."""
+
+LONG = 1 << 18
+"""Bytes of a text that is worth reading as it lies in the file."""
 
 EPISODE = ("episode", "run", "restart")
 """What the column is called that counts where the header comes again: the first of these that is free."""
@@ -55,6 +69,9 @@ class Text(OneFile):
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt")
     part: str | None = None
     """The part that is read, where the user names one."""
+    wanted: Columns = Columns()
+    """Which columns will be read; all of them where it names no states."""
+    _is_unusual = False
 
     @classmethod
     def matches(cls, file: File) -> bool:
@@ -68,20 +85,35 @@ class Text(OneFile):
     def for_part(self, name: str) -> "Text":
         """Return the same file, of which this part is read. That it is not there, `columns` says."""
         alike = copy(self)
-        for known in ("_layout", "_sheet", "row_groups"):
+        for known in CACHED:
             alike.__dict__.pop(known, None)
         alike.part = name
         return alike
 
+    def for_columns(self, wanted: Columns) -> "Text":
+        """Return the same file, of which these columns will be read, by whatever role they play."""
+        alike = copy(self)
+        for known in CACHED:
+            alike.__dict__.pop(known, None)
+        alike.wanted = wanted
+        return alike
+
     def columns(self) -> Header:
         """Return the columns, by the header, or without names."""
+        plain = self._plain()
+        return self._header(self._layout, {} if plain is None else plain.columns)
+
+    def _header(self, layout: Layout, read: Mapping[int, pa.Array]) -> Header:
+        """Return the columns of a layout; those that were read are known to be numbers or text."""
         columns: list[Column] = []
         seen: dict[str, int] = {}
-        layout = self._layout
         lists: dict[str, tuple[pa.DataType, int | None]] = {}
-        for place, (name, cell, unit) in enumerate(zip(layout.names, layout.cells, self._units, strict=True)):
+        units = _units(layout)
+        for place, (name, cell, unit) in enumerate(zip(layout.names, layout.cells, units, strict=True)):
             nth = seen[name] = seen.get(name, -1) + 1
-            kind = pa.string() if isinstance(cell, int) else cell.kind
+            kind = (
+                cell.kind if not isinstance(cell, int) else read[cell].type if cell in read else pa.string()
+            )
             width = layout.widths.get(place, 0)
             if not width or not name:
                 columns.append(Column(name, kind, None, nth, unit=unit))
@@ -104,18 +136,26 @@ class Text(OneFile):
     @cached_property
     def row_groups(self) -> tuple[int, ...]:
         """The number of samples."""
-        return (len(self._rows()[0].lines),)
+        plain = self._plain()
+        return (len(self._rows()[0].lines) if plain is None else len(plain),)
 
     def read(
         self, columns: Sequence[ColumnKey], start: int = 0, stop: int | None = None
     ) -> Iterator[tuple[int, pa.RecordBatch]]:
         """Read rows of these columns as one piece, with its first row."""
-        rows, guesses = self._rows()
-        names = self._layout.names
+        layout = self._layout
+        names, units = layout.names, _units(layout)
         at = [[i for i, other in enumerate(names) if other == name][nth] for name, nth in columns]
-        arrays, found = parse(rows, self._layout, at, self.file.shown, self.place)
-        units = said_of_units({names[i] or f"column {i}": self._units[i] for i in at})
-        about = note_guesses((*guesses, *self._layout.notes, *rows.notes, *found, *units))
+        read = self._read_plain(at)
+        if read is None:
+            rows, guesses = self._rows()
+            arrays, found = parse(rows, layout, at, self.file.shown, self.place)
+            left_out = rows.notes
+        else:
+            arrays, found, left_out = read
+            guesses = ()
+        said = said_of_units({names[i] or f"column {i}": units[i] for i in at})
+        about = note_guesses((*guesses, *layout.notes, *left_out, *found, *said))
         batch = pa.RecordBatch.from_arrays(arrays, names=[name for name, _ in columns], metadata=about)
         length = len(batch) if stop is None else stop - start
         yield start, batch.slice(start, length)
@@ -128,14 +168,6 @@ class Text(OneFile):
     def identity(self) -> str:
         """Say what tells the part that is read from others."""
         return repr((self.file.identity(), self.part)) if self.part else super().identity()
-
-    @property
-    def _units(self) -> tuple[str, ...]:
-        layout = self._layout
-        return tuple(
-            unit or unit_in(name)
-            for name, unit in zip(layout.names, layout.units or [""] * len(layout.names), strict=True)
-        )
 
     @property
     def _beside(self) -> list[str]:
@@ -167,6 +199,16 @@ class Text(OneFile):
 
     @cached_property
     def _layout(self) -> Layout:
+        layout = self._begun
+        if not layout.heading or self._plain() is not None or not begins_anew(self._read()[0], layout):
+            return layout
+        name = next(name for name in EPISODE if name not in layout.names)
+        units = (*layout.units, "") if layout.units else ()
+        return replace(layout, names=(*layout.names, name), cells=(*layout.cells, Part()), units=units)
+
+    @cached_property
+    def _begun(self) -> Layout:
+        """The layout as the first lines tell it."""
         data, is_all = self._begin()
         # Enough lines; lines of thousands of columns are longer than what is looked at.
         if not is_all and sum(1 for _ in islice(content(data), PROBED)) < PROBED:
@@ -179,17 +221,69 @@ class Text(OneFile):
             titles = motion_capture.sections(lines)
             layout = motion_capture.find_vicon(lines, find_part(section, titles, self.file.shown))
             if layout is not None:
+                self._is_unusual = True
                 return layout
         find_part(section, (), self.file.shown)
         for find in PROGRAMS:
             with damage_named(self.file.shown, "a text table"):
                 layout = find(lines)
             if layout is not None:
-                break
+                return layout
+        return find_layout(data, self.file.shown, self._beside)
+
+    @property
+    def _may_be_plain(self) -> bool:
+        """Whether the text is worth reading as it lies in the file."""
+        return self.part is None and self.file.info.size > LONG and find_codec(self.file) is None
+
+    def _plain(self) -> Plain | None:
+        """Return the columns that are wanted as Arrow reads them, where the text is plain."""
+        if self._is_unusual:
+            return None
+        plain: Plain | None = kept.find(self)
+        if plain is not None:
+            return plain
+        if self._may_be_plain:
+            layout = self._begun
+            plain = read_plain(
+                self.file, layout, find_wanted(self._header(layout, {}), layout, self.wanted.read)
+            )
+        if plain is None:
+            self._is_unusual = True
         else:
-            layout = find_layout(data, self.file.shown, self._beside)
-        if begins_anew(data if is_all else self._read()[0], layout):
-            name = next(name for name in EPISODE if name not in layout.names)
-            units = (*layout.units, "") if layout.units else ()
-            layout = replace(layout, names=(*layout.names, name), cells=(*layout.cells, Part()), units=units)
-        return layout
+            kept.keep(self, plain, plain.n_bytes)
+        return plain
+
+    def _read_plain(
+        self, at: Sequence[int]
+    ) -> tuple[list[pa.Array], tuple[str, ...], tuple[str, ...]] | None:
+        """Return columns of a plain text, what was guessed of them, and what was left out."""
+        plain = self._plain()
+        if plain is None:
+            return None
+        layout = self._layout
+        names = {cell: layout.names[i] for i, cell in enumerate(layout.cells) if isinstance(cell, int)}
+        cells = [layout.cells[i] for i in at]
+        needed = [one for cell in cells for one in ([cell] if isinstance(cell, int) else cell.needs)]
+        if not plain.columns.keys() >= set(needed):
+            return None
+        arrays = [
+            plain.columns[cell]
+            if isinstance(cell, int)
+            else cell.make(
+                cells_of(cell, dict(plain.columns), names, self.file.shown, self.place), len(plain), ()
+            )
+            for cell in cells
+        ]
+        return (
+            arrays,
+            tuple(guess for one in dict.fromkeys(needed) for guess in plain.guesses[one]),
+            plain.notes,
+        )
+
+
+def _units(layout: Layout) -> tuple[str, ...]:
+    return tuple(
+        unit or unit_in(name)
+        for name, unit in zip(layout.names, layout.units or [""] * len(layout.names), strict=True)
+    )

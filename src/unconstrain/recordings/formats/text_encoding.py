@@ -76,7 +76,7 @@ def read_text(file: File, part: str | None = None) -> tuple[bytes, tuple[str, ..
         The content is no text, or damaged, or does not fit into memory.
     """
     check_memory(3.0 * file.info.size, f"reading {file.shown}", INSTEAD)
-    codec = _codec(file)
+    codec = find_codec(file)
     said: tuple[str, ...] = ()
     if codec == ZIP:
         every = members(file)
@@ -107,7 +107,7 @@ def begin_text(file: File, part: str | None = None) -> tuple[bytes, bool, tuple[
     DataError
         The content is no text, or damaged.
     """
-    codec = _codec(file)
+    codec = find_codec(file)
     if codec is None:
         data = file.begin()
         is_all = len(data) == file.info.size
@@ -127,7 +127,7 @@ def members(file: File) -> tuple[str, ...]:
 
     What a computer adds for itself is left out.
     """
-    if _codec(file) != ZIP:
+    if find_codec(file) != ZIP:
         return ()
     with damage_named(file.shown, "a ZIP archive"), file.open() as opened, zipfile.ZipFile(opened) as archive:
         return tuple(
@@ -149,7 +149,7 @@ def is_text(file: File) -> bool:
 
 def is_compressed(file: File) -> bool:
     """Whether a file begins as compressed ones do."""
-    codec = _codec(file)
+    codec = find_codec(file)
     # Workbooks and archives of arrays are ZIP archives too.
     return codec is not None and (codec != ZIP or file.suffix == ".zip")
 
@@ -210,7 +210,17 @@ def _is_wide(data: bytes) -> bool:
     return min(even, odd) == 0 and max(even, odd) > min(len(data), PROBED) / 4
 
 
-def _codec(file: File) -> str | None:
+def find_codec(file: File) -> str | None:
+    """Return what a file is compressed with; None for plain text.
+
+    Parameters
+    ----------
+    file : File
+
+    Returns
+    -------
+    str or None
+    """
     codec = next((codec for magic, codec in CODECS.items() if file.magic.startswith(magic)), None)
     # Three letters may begin a text, too.
     return None if codec == "bz2" and file.magic[4:10] not in BZIP_BLOCKS else codec

@@ -69,30 +69,30 @@ def plain_text(
     DataError
         It cannot be told what commas in numbers mean.
     """
-    numbers = _cast(column)
+    numbers = cast(column)
     if numbers is not None and len(column) and _any(column[:1], DATE):
         stamps, _ = iso_times(column)
         if stamps is not column:
             guesses[f"{called} is read as dates and times written without marks, such as {column[0]}"] = None
             return stamps
     if numbers is not None:
-        return _without_sentinels(column, numbers, called, guesses)
+        return without_sentinels(column, numbers, called, guesses)
     column = pc.utf8_trim_whitespace(column)
     column = pc.if_else(pc.equal(column, ""), pa.scalar(None, pa.string()), column)
     own: dict[str, None] = {}
     cleaned = _without_words(column, called, own)
     if may_have_commas:
         cleaned = _without_commas(cleaned, where, called, own)
-    if _cast(cleaned) is None:
+    if cast(cleaned) is None:
         cleaned = _without_spaces(cleaned, called, own)
         if may_have_commas and any("spaces" in guess for guess in own):
             cleaned = _without_commas(cleaned, where, called, own)
         cleaned = pc.replace_substring_regex(cleaned, FORTRAN, r"\1e\2")
         cleaned = _without_units(cleaned, called, own)
-    numbers = _cast(cleaned)
+    numbers = cast(cleaned)
     if numbers is not None:
         guesses |= own
-        return _without_sentinels(cleaned, numbers, called, guesses)
+        return without_sentinels(cleaned, numbers, called, guesses)
     worded = _without_words(column, called, {})
     stamps, found = iso_times(worded)
     if stamps is not worded:
@@ -103,7 +103,17 @@ def plain_text(
     return again
 
 
-def _cast(column: pa.Array) -> pa.Array | None:
+def cast(column: pa.Array) -> pa.Array | None:
+    """Return text as numbers; None where some of it is none.
+
+    Parameters
+    ----------
+    column : pyarrow.Array of text
+
+    Returns
+    -------
+    pyarrow.Array of float64, or None
+    """
     try:
         return column.cast(pa.float64())
     except pa.ArrowInvalid:
@@ -121,10 +131,23 @@ def _without_words(column: pa.Array, called: str, guesses: dict[str, None]) -> p
     return pc.if_else(words, pa.scalar(None, pa.string()), column)
 
 
-def _without_sentinels(
-    column: pa.Array, numbers: pa.Array, called: str, guesses: dict[str, None]
-) -> pa.Array:
-    """Return a column without a number such as -9999 that lies far from all others."""
+def without_sentinels(column: pa.Array, numbers: pa.Array, called: str, guesses: dict[str, None]) -> pa.Array:
+    """Return a column without a number such as -9999 that lies far from all others.
+
+    Parameters
+    ----------
+    column : pyarrow.Array of text
+    numbers : pyarrow.Array
+        Its numbers.
+    called : str
+        The column, as a sentence says it.
+    guesses : dict of str to None
+        What is guessed is added to it.
+
+    Returns
+    -------
+    pyarrow.Array of text
+    """
     if len(numbers) < FEWEST:
         return column
     for sentinel in SENTINELS:
@@ -142,7 +165,7 @@ def _without_sentinels(
                 f"{called} holds {sentinel:g} in {rows}, taken for missing since all others lie from {low:g} to "
                 f"{high:g}; write another number if it is meant"
             ] = None
-            column = pc.if_else(held, pa.scalar(None, pa.string()), column)
+            column = pc.if_else(held, pa.scalar(None, column.type), column)
     return column
 
 

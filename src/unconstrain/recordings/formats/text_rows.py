@@ -74,16 +74,32 @@ def find_rows(data: bytes, layout: Layout) -> Rows:
             )
     entries, begins = _without_headings(data, entries, layout, notes)
     if len(entries) >= FEWEST and begins[-1:] != [len(entries)]:
-        count = len(entries)
-        _leave_out_footer(entries, layout, notes)
-        if len(entries) == count:
-            _leave_out_half(data, entries, layout, notes)
+        leave_out_end(data, entries, layout, notes)
     return Rows(
         [line for _, line in entries],
         [number for number, _ in entries],
         tuple(begin for begin in begins if 0 < begin < len(entries)),
         tuple(notes),
     )
+
+
+def leave_out_end(data: bytes, entries: list[tuple[int, bytes]], layout: Layout, notes: list[str]) -> None:
+    """Leave out lines below the table, or a last line that was cut, and note it.
+
+    Parameters
+    ----------
+    data : bytes
+        The text, or its end.
+    entries : list of (int, bytes)
+        Its lines with their numbers, from which those at the end are taken. Only the first and the last ones matter.
+    layout : Layout
+    notes : list of str
+        To which notes are added.
+    """
+    count = len(entries)
+    _leave_out_footer(entries, layout, notes)
+    if len(entries) == count:
+        _leave_out_half(data, entries, layout, notes)
 
 
 def begins_anew(data: bytes, layout: Layout) -> bool:

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Union
 
 import numpy as np
@@ -49,12 +50,12 @@ class Leaf:
     where: Any
     index: tuple[Any, ...] | None = None
 
-    @property
+    @cached_property
     def size(self) -> int:
         """The number of values."""
         return math.prod(self.shape)
 
-    @property
+    @cached_property
     def numbers(self) -> int:
         """The number of values that may become columns: none of images."""
         longest = max(self.shape, default=1)

@@ -62,6 +62,10 @@ class Xlsx(Text):
     def _begin(self) -> tuple[bytes, bool]:
         return self._sheet[0], True
 
+    @property
+    def _may_be_plain(self) -> bool:
+        return False
+
     @cached_property
     def _sheets(self) -> tuple[str, ...]:
         with self._book() as book:

@@ -77,7 +77,7 @@ def _read(pieces: Sequence[Piece], fields: Sequence[Field], role: str, gappy: bo
             for field in fields
         ]
         return np.stack(columns, axis=1).astype(np.float64)
-    return np.ascontiguousarray(read_numbers(pieces, fields, role).T, dtype=np.float64)
+    return np.ascontiguousarray(read_numbers(pieces, fields, role, by_row=True).T, dtype=np.float64)
 
 
 def _numbers(pieces: Sequence[Piece]) -> NDArray[np.int64]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from unconstrain.recordings.episodewise import norms
 from unconstrain.recordings.notes import Note
 from unconstrain.recordings.pauses import AT_REST, SHORTEST, find_pauses
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
@@ -18,9 +19,9 @@ def find_rest(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     if rows.time is None or recording.saves:
         return rows, ()
     resting = np.zeros(len(rows), dtype=bool)
-    count = 0
+    count, speeds = 0, norms(rows.U)
     for own in rows.runs():
-        resting[own], number = find_pauses(rows.U[own], rows.time[own])
+        resting[own], number = find_pauses(speeds[own], rows.time[own])
         count += number
     if not count:
         return rows, ()

@@ -47,7 +47,8 @@ def split_rows(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
         rows.X, rows.time, rows.codes, gap=gap, max_speed=how.max_speed, long_enough=long_enough,
         drop_short=how.drops("short"),
     )  # fmt: skip
-    rows = replace(rows.take(found.samples), codes=found.episodes, origins=found.origins)
+    kept = rows if len(found.samples) == len(rows) else rows.take(found.samples)
+    rows = replace(kept, codes=found.episodes, origins=found.origins)
     return rows, _describe(found, recording)
 
 

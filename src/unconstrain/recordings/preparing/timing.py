@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from unconstrain.recordings.blocks import number_values
+from unconstrain.recordings.joined import join_cells, places
 from unconstrain.recordings.notes import Note
-from unconstrain.recordings.pieces import places
 from unconstrain.recordings.preparing.rows import Notes, Portion, Rows
-from unconstrain.recordings.steps import comes_in_bursts
+from unconstrain.recordings.steps import are_even, comes_in_bursts
 from unconstrain.recordings.time import repeated
 
 
@@ -40,7 +40,7 @@ def _read_stamps(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
     recording, pieces = portion.recording, portion.complete
     field = recording.roles.time
     assert field is not None
-    stamps = [piece.alike(field, "time") for piece in pieces]
+    stamps = join_cells(pieces, field, "time")
     if recording.saves and not recording.splits:
         return replace(rows, time=np.concatenate([part.numbers() for part in stamps])), ()
     clock, where = recording.clock, places(pieces)
@@ -63,6 +63,8 @@ def _read_stamps(portion: Portion, rows: Rows) -> tuple[Rows, Notes]:
 def _note_bursts(name: str, rows: Rows) -> Notes:
     """Note the episodes whose stamps come in bursts."""
     assert rows.time is not None
+    if are_even(np.diff(rows.time)[np.diff(rows.codes) == 0]) and np.all(np.diff(rows.codes) >= 0):
+        return ()
     count = sum(comes_in_bursts(np.diff(rows.time[own])) for own in rows.runs())
     text = (
         "the stamps of {} come in bursts, as when messages are stamped where they arrive; name better stamps with "

@@ -27,7 +27,7 @@ from unconstrain.fitting.solve import EpisodeFolds, choose_alpha
 from unconstrain.fitting.sums import Sums
 from unconstrain.fitting.wide.choice import choose_alpha as choose_alpha_of_held
 from unconstrain.fitting.wide.decay import WideDecay
-from unconstrain.fitting.wide.held import HeldSamples
+from unconstrain.fitting.wide.held import HeldSamples, is_wide
 from unconstrain.motion import NO_MOTION, lengths
 from unconstrain.samples import Samples
 
@@ -483,7 +483,7 @@ class Accumulator:
         judges: list[Any] = [
             part for k, part in enumerate(self.total.judges) if part is not None and k != without
         ]
-        if self.holds:
+        if isinstance(folds[0], HeldSamples):
             return self._solve_held(folds, judges or None, alpha, near)
         total = add_up(folds)
         decay = self.model.decay(total)
@@ -606,7 +606,9 @@ class Accumulator:
 
     def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Part:
         X, weights = samples.states, samples.weights
-        add: Callable[..., Any] = partial(HeldSamples.of, self.model) if self.holds else self.model.moments
+        # Where whole actions are observed, as by the regression that inference begins with, H is smaller.
+        holds = self.holds and is_wide(self.model, X[:1], whole=observation.whole)
+        add: Callable[..., Any] = partial(HeldSamples.of, self.model) if holds else self.model.moments
         if rows.all():
             return add(X, observation, weights)
         index = np.flatnonzero(rows)

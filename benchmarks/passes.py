@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 import unconstrain as uc
-from benchmarks.fits import half_free
+from benchmarks.fits import draw_half_free
 from benchmarks.ratio import Ratio, medians
 from unconstrain.fitting.accumulator import Accumulator
 from unconstrain.fitting.inference import PASSES_PER_CHOICE
@@ -19,7 +19,7 @@ N_SAMPLES = 10_000
 
 
 def _measure(name: str, what: str, policy: uc.LocallyLinearPolicy | uc.ParametricPolicy) -> Ratio:
-    X, U, groups = half_free(N_SAMPLES, 7)
+    X, U, groups = draw_half_free(N_SAMPLES, 7)
     fitted = policy.fit(X, U, groups=groups)
     samples, scale = Samples(X, U, groups), float(np.mean(np.sum(U**2, axis=1)))
 

@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 import unconstrain as uc
-from benchmarks.fits import _data, _half_free
+from benchmarks.fits import _data, draw_half_free
 from benchmarks.stream import ACTION, STATE, _folder
 from unconstrain.fitting.inference import Inference
 from unconstrain.fitting.moments import Moments
@@ -125,7 +125,7 @@ def _model(P: int) -> Model:
 
 def _passes() -> tuple[int, float]:
     """Count the passes of the adaptive risk, and compare a usual one to a pass of the inconsistency."""
-    X, U, groups = _half_free(10_000, DIMENSIONS)
+    X, U, groups = draw_half_free(10_000, DIMENSIONS)
     samples = Samples(X, U, groups)
     policy = uc.ParametricPolicy(uc.NormalizedRBF(centers=X[:: len(X) // 14][:14].copy(), width=2.0))
     inference = Inference(policy.start(samples))

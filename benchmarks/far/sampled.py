@@ -3,7 +3,7 @@
 import numpy as np
 
 import unconstrain as uc
-from benchmarks.fits import _half_free
+from benchmarks.fits import draw_half_free
 
 DIMENSIONS = 7
 
@@ -13,7 +13,7 @@ def measure_sampled(n_rows: int, shares: tuple[float, ...]) -> dict[tuple[int, s
 
     Errors are mean squares as a share of the policy's own.
     """
-    X, U, groups = _half_free(n_rows, DIMENSIONS)
+    X, U, groups = draw_half_free(n_rows, DIMENSIONS)
     errors = {}
     for share in (*shares, 1.0):
         part = groups < share * (groups.max() + 1)

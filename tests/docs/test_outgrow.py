@@ -38,7 +38,8 @@ def test_the_code_runs(place):
         "s3://",
         "MyTransformer",
         "large.skops",
-    )  # a cluster, the reader's own class, half a gigabyte
+        ".fit(demos",
+    )  # a cluster, the reader's own class, half a gigabyte, the reader's data
     names = {}
     with contextlib.chdir(place):
         for block in blocks:

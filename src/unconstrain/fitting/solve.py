@@ -6,15 +6,18 @@ from typing import Any
 import numpy as np
 
 from unconstrain.errors import DataError
-from unconstrain.fitting.corrected import Part
+from unconstrain.fitting.corrected import Part, add_up
 from unconstrain.fitting.decay import Decay
 from unconstrain.fitting.moments import Moments
-from unconstrain.waiting import each
+from unconstrain.parallel import map_shares
+from unconstrain.waiting import each, within
 
 N_FOLDS = 5
 N_ALPHAS = 25
 # From one at the resolution of H to one that flattens the policy: pure numbers, relative to H's mean eigenvalue.
 SMALLEST, LARGEST = 1e-11, 1e1
+# Numbers in H from which on a fold is work for a thread: BLAS would share out its many narrow products less well.
+SIDE_BY_SIDE = 100_000
 # Candidates whose held-out risk is within this share of the least cannot be told apart, and the largest is taken:
 # where no sample shows a direction the risk is flat over many decades of λ, and with a small λ slight misfits would
 # determine the parameters there, at many times the size of the policy.
@@ -170,12 +173,22 @@ def choose_alpha(
     if len(folds) < 2:
         raise DataError(ONE_FOLD)
     alphas = np.geomspace(SMALLEST, LARGEST, N_ALPHAS)
-    error = np.zeros(N_ALPHAS)
-    pairs = zip(judges, _leave_one_out(folds), strict=True)
-    for held_out, others in each(pairs, "choosing λ", len(judges), unit="folds"):
+
+    def judge(held_out: Moments, others: Any) -> np.ndarray:
         train = observed(others)
         candidates = decay_of(train).decompose(train).solve(alphas)
-        error += held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
+        return held_out.risk(candidates).reshape(-1, N_ALPHAS).sum(axis=0)
+
+    def judge_share(places: Sequence[int]) -> np.ndarray:
+        return np.sum([judge(judges[i], add_up(folds[:i] + folds[i + 1 :])) for i in places], axis=0)
+
+    if judges[0].H.size >= SIDE_BY_SIDE:
+        with within("choosing λ"):
+            error = np.sum(map_shares(judge_share, range(len(folds))), axis=0)
+    else:
+        pairs = zip(judges, _leave_one_out(folds), strict=True)
+        progress = each(pairs, "choosing λ", len(judges), unit="folds")
+        error = np.sum([judge(*pair) for pair in progress], axis=0)
     error /= sum(float(fold.weight.sum()) for fold in folds)
     as_good = error <= (1 + INDISTINGUISHABLE) * error.min()
     return float(alphas[as_good].max()), alphas, error

@@ -50,3 +50,16 @@ def test_a_fit_is_the_same_in_one_thread_in_many_and_side_by_side(policy):
     with ThreadPoolExecutor(3) as pool:
         for each in pool.map(fitted, range(6)):
             np.testing.assert_allclose(each, alone, rtol=1e-7, atol=1e-9)
+
+
+def test_actions_and_contact_do_not_hang_on_threads():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(70_000, 2))
+    policy = uc.LocallyLinearPolicy(n_centers=5).fit(X[:300], np.sin(X[:300]), groups=np.arange(300) // 30)
+    demos = uc.Demonstrations(X, np.sin(X), np.arange(70_000) // 100)
+    found = []
+    for threads in (1, 2):
+        with threadpool_limits(threads):
+            found.append((policy.predict(X), policy.free_probability(demos)))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-12, atol=1e-14)

@@ -10,10 +10,14 @@ from functools import cache
 from threading import Lock
 from typing import TypeVar
 
+import numpy as np
 from threadpoolctl import ThreadpoolController
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+ROWS_OF_THREAD = 2**15
+"""States at a time: enough that what is done once for all of them does not count."""
 
 _one_at_a_time = Lock()
 
@@ -67,6 +71,35 @@ def map_shares(work: Callable[[Sequence[T]], R], pieces: Sequence[T]) -> list[R]
             return list(pool.map(work, [pieces[i::threads] for i in range(threads)]))
     finally:
         _one_at_a_time.release()
+
+
+def evaluate_in_shares(evaluate: Callable[[np.ndarray], np.ndarray], X: np.ndarray, d: int) -> np.ndarray:
+    """Evaluate a function of states that is elementwise work, in as many threads as BLAS would use.
+
+    Parameters
+    ----------
+    evaluate : callable
+        From states (B, n) to actions (B, d), a row for a row.
+    X : ndarray of shape (N, n)
+        States.
+    d : int
+        How many actions there are.
+
+    Returns
+    -------
+    ndarray of shape (N, d)
+        Actions.
+    """
+    if len(X) < 2 * ROWS_OF_THREAD:
+        return evaluate(X)
+    actions = np.empty((len(X), d))
+
+    def share(blocks: Sequence[slice]) -> None:
+        for block in blocks:
+            actions[block] = evaluate(X[block])
+
+    map_shares(share, cut_blocks(len(X), ROWS_OF_THREAD))
+    return actions
 
 
 @cache

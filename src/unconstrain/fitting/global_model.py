@@ -12,6 +12,7 @@ from unconstrain.fitting.kernels import parametric
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 from unconstrain.fitting.posterior import Posterior
+from unconstrain.parallel import evaluate_in_shares
 
 COVARIANCE_ROWS = 1024
 
@@ -71,7 +72,7 @@ class GlobalModel:
 
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy; see `Model.evaluate`."""
-        return self.features.evaluate(X, w)
+        return evaluate_in_shares(lambda states: self.features.evaluate(states, w), X, self.n_actions)
 
     def covariance(self, X: np.ndarray, P: np.ndarray, posterior: Posterior) -> np.ndarray:
         """Compute second moments of the true policy about predictions; see `Model.covariance`."""

@@ -14,6 +14,7 @@ from unconstrain.fitting.kernels.products import distinct_products, pairs
 from unconstrain.fitting.moments import Moments
 from unconstrain.fitting.observation import Observation
 from unconstrain.fitting.posterior import Posterior
+from unconstrain.parallel import evaluate_in_shares
 from unconstrain.receptive import activations, blend, normalized_activations
 
 PRIORS = ("global", "zero")
@@ -95,7 +96,10 @@ class LocalModels:
     def evaluate(self, X: np.ndarray, w: np.ndarray) -> np.ndarray:
         """Evaluate the policy; see `Model.evaluate`."""
         if isinstance(self.features, FullBasis):
-            return self._evaluate_blended(self.features, X, w)
+            features = self.features
+            return evaluate_in_shares(
+                lambda states: self._evaluate_blended(features, states, w), X, self.n_actions
+            )
         actions = np.zeros((len(X), self.n_actions))
         for start in range(0, len(X), BLOCK_ROWS):
             block = X[start : start + BLOCK_ROWS]

@@ -5,6 +5,7 @@ import numpy as np
 from unconstrain.errors import DataError
 from unconstrain.fitting.solve import INDISTINGUISHABLE, LARGEST, N_ALPHAS, ONE_FOLD, SMALLEST
 from unconstrain.fitting.wide.decay import WideDecay
+from unconstrain.waiting import within
 
 BESIDE_RESIDUAL = 1e-2
 """Precision of predictions as a share of what the parameters leave of the actions: risks are then right to 1e-4."""
@@ -60,13 +61,14 @@ def choose_alpha(decay: WideDecay, near: float | None = None) -> tuple[float, np
     if near is not None:
         lowest, highest = max(first - NEAR, lowest), min(first + NEAR, highest)
     trials = Trials(decay, grid)
-    trials.walk(first, -2, lowest)
-    if trials.best() == first:
-        trials.walk(first + 2, 2, highest)
-    best = trials.best()
-    for beside in (best + 1, best - 1):
-        if lowest <= beside <= highest:
-            trials.risk(beside, best)
+    with within("choosing λ"):
+        trials.walk(first, -2, lowest)
+        if trials.best() == first:
+            trials.walk(first + 2, 2, highest)
+        best = trials.best()
+        for beside in (best + 1, best - 1):
+            if lowest <= beside <= highest:
+                trials.risk(beside, best)
     places = sorted(trials.risks)
     risks = np.array([trials.risks[place] for place in places])
     return float(grid[trials.best()]), grid[places], risks / decay.weight

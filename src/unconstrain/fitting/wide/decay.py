@@ -15,6 +15,7 @@ from unconstrain.fitting.wide.conjugate import Solved, solve
 from unconstrain.fitting.wide.held import HeldSamples
 from unconstrain.fitting.wide.passes import Passes
 from unconstrain.fitting.wide.preconditioner import Subset
+from unconstrain.waiting import within
 
 PRECISION = 1e-8
 """Of predictions at the samples, as a share of the root mean square action."""
@@ -165,16 +166,24 @@ class WideDecay:
         if key not in self._pulls:
             self._pulls[key] = self.passes.pulls(left_out)
         g, squares = self._pulls[key]
-        return solve(
-            lambda W, those: self.passes.apply(W, [left_out[i] for i in those]) + decays[those, None] * W,
-            g,
-            squares,
-            self._subset_of_all().factorize(max(alpha, SMALLEST_INVERTED) * self.scale),
-            np.zeros_like(g) if start is None else start,
-            precision=precision,
-            beside_residual=beside_residual,
-            most_steps=most_steps,
-        )
+        with within("solving by conjugate gradients", unit="passes") as report:
+            begun = self.passes.n_passes
+
+            def apply(W: np.ndarray, those: np.ndarray) -> np.ndarray:
+                product = self.passes.apply(W, [left_out[i] for i in those]) + decays[those, None] * W
+                report(self.passes.n_passes - begun)
+                return product
+
+            return solve(
+                apply,
+                g,
+                squares,
+                self._subset_of_all().factorize(max(alpha, SMALLEST_INVERTED) * self.scale),
+                np.zeros_like(g) if start is None else start,
+                precision=precision,
+                beside_residual=beside_residual,
+                most_steps=most_steps,
+            )
 
     def _scale(self, without: int | None) -> float:
         """Return h of all folds but one."""

@@ -33,7 +33,8 @@ def held(monkeypatch):
     """Let models be wide from one parameter on."""
 
     def choose(is_held):
-        monkeypatch.setattr(wide.held, "WIDE", 0 if is_held else 10**9)
+        for name in ("WIDE", "WIDE_FOR_CHOICE"):
+            monkeypatch.setattr(wide.held, name, 0 if is_held else 10**9)
 
     return choose
 
@@ -72,6 +73,21 @@ def test_held_samples_give_the_answer_of_their_moments(held, kind, risk, alpha):
     assert by_passes.alpha_ == pytest.approx(summed.alpha_)
     P = summed.predict(X)
     assert np.sqrt(np.mean((by_passes.predict(X) - P) ** 2) / np.mean(P**2)) < 1e-6
+
+
+def test_held_out_risks_are_those_of_moments_also_of_a_small_subset(held, monkeypatch):
+    X, U, groups, _ = movements()
+    monkeypatch.setattr(wide.preconditioner, "MOST_ROWS", 60)
+
+    def fit():
+        return uc.ParametricPolicy(uc.NormalizedRBF(n_centers=60), risk="inconsistency").fit(
+            X, U, groups=groups
+        )
+
+    summed, by_passes = both(held, fit)
+    assert by_passes.alpha_ == pytest.approx(summed.alpha_)
+    risks = np.interp(np.log(by_passes.alphas_), np.log(summed.alphas_), summed.held_out_risk_)
+    np.testing.assert_allclose(by_passes.held_out_risk_, risks, rtol=1e-3)
 
 
 def test_known_projections_and_contact_are_learnt_alike(held):

@@ -607,7 +607,9 @@ class Accumulator:
     def _moments(self, samples: Samples, observation: Observation, rows: np.ndarray) -> Part:
         X, weights = samples.states, samples.weights
         # Where whole actions are observed, as by the regression that inference begins with, H is smaller.
-        holds = self.holds and is_wide(self.model, X[:1], whole=observation.whole)
+        holds = self.holds and is_wide(
+            self.model, X[:1], whole=observation.whole, chooses_alpha=self.alpha == "cv"
+        )
         add: Callable[..., Any] = partial(HeldSamples.of, self.model) if holds else self.model.moments
         if rows.all():
             return add(X, observation, weights)

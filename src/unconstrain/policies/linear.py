@@ -144,7 +144,12 @@ class LinearPolicy(Policy):
                 f"{accumulator.model.n_actions}"
             )
         if self.risk != "corrected":  # which takes noise away from moments
-            accumulator.holds = is_wide(accumulator.model, samples.states[:1], whole=self.risk == "direct")
+            accumulator.holds = is_wide(
+                accumulator.model,
+                samples.states[:1],
+                whole=self.risk == "direct",
+                chooses_alpha=self.alpha == "cv",
+            )
         if self.risk == "adaptive":
             accumulator = infer_contact(accumulator, lambda wanted: wanted.add(samples), at_hand)
         else:

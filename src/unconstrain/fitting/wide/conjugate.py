@@ -53,7 +53,6 @@ def solve(
     start: np.ndarray,
     *,
     precision: float,
-    beside_residual: float,
     most_steps: int,
 ) -> Solved:
     """Solve systems.
@@ -72,8 +71,6 @@ def solve(
         Where to begin.
     precision : float
         Of predictions at the samples, as a share of the root mean square action.
-    beside_residual : float
-        The same beside what the parameters leave of the actions; the larger of both is enough.
     most_steps : int
         At most.
 
@@ -105,9 +102,7 @@ def solve(
         else:
             R[:, going] = g[:, going] - apply(W[:, going], going)
         recent = np.sum(gains[-DELAY:], axis=0)
-        along = _dots(g, W)
-        left = np.maximum(squares - along - _dots(R, W), 0.0)
-        enough = np.maximum(precision**2 * squares, beside_residual**2 * left)
+        enough = precision**2 * squares
         error[going] = (recent / np.maximum(squares, tiny))[going]
         done = np.zeros(len(going), dtype=bool) if step < DELAY else (recent <= enough)[going]
         going = going[~(done | ~sound)]

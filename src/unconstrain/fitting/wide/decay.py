@@ -128,7 +128,6 @@ class WideDecay:
             self._subset_of_all().factorize(max(decay, SMALLEST_INVERTED * self.scale)),
             np.zeros(shape),
             precision=OF_PROBES,
-            beside_residual=0.0,
             most_steps=MOST_STEPS,
         )
         unused = decay * np.einsum("mld,mld->l", probes, found.W).mean()
@@ -141,7 +140,6 @@ class WideDecay:
         start: np.ndarray | None = None,
         *,
         precision: float = PRECISION,
-        beside_residual: float = 0.0,
         most_steps: int = MOST_STEPS,
     ) -> Solved:
         """Solve for one λ, without a fold each.
@@ -154,7 +152,7 @@ class WideDecay:
             The fold that each system is without; None for none.
         start : ndarray of shape (M, L, d), optional
             Where to begin; by default at zero.
-        precision, beside_residual, most_steps
+        precision, most_steps
             See `conjugate.solve`.
 
         Returns
@@ -181,7 +179,6 @@ class WideDecay:
                 self._subset_of_all().factorize(max(alpha, SMALLEST_INVERTED) * self.scale),
                 np.zeros_like(g) if start is None else start,
                 precision=precision,
-                beside_residual=beside_residual,
                 most_steps=most_steps,
             )
 
